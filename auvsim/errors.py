@@ -1,0 +1,22 @@
+"""Errors of auvsim: one root; a text says what was wrong, where, and what would be right."""
+
+
+class AuvsimError(Exception):
+    """Root of all errors that auvsim raises on purpose."""
+
+    exit_code = 2
+
+
+class InputError(AuvsimError):
+    """A scenario, model, log or argument that cannot be used; the process leaves with exit code 2."""
+
+
+class DivergenceError(AuvsimError):
+    """The simulation left the range of finite, physical states; the process leaves with exit code 1."""
+
+    exit_code = 1
+
+
+def unknown_name(kind: str, name: str, known: "list[str]") -> InputError:
+    """An error that lists the names that do exist: `no vehicle 'remus'; there are lauv, remus100`."""
+    return InputError(f"no {kind} '{name}'; there are {', '.join(sorted(known)) or 'none'}")
