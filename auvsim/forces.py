@@ -1,0 +1,166 @@
+"""Forces of hull, fin and propeller as compiled functions of the velocity relative to the water.
+
+All vectors here are in the element's own MuJoCo axes (x forward, y port, z up); `hydrodynamics` converts the SNAME
+coefficients once. A coefficient record `c` starts at `o`; its layout is `HULL`, `FIN` and `PROPELLER` below, so that the same
+code serves a NumPy array and a row of `mjModel.body_user`.
+"""
+
+import math
+
+from numba import njit
+
+STRIPS = 16  # the most cross-flow strips a hull may have
+
+# Offsets of the coefficient records behind the common head [kind, water slot, water density].
+KIND, SLOT, DENSITY, HEAD = 0, 1, 2, 3
+HULL_KIND, FIN_KIND, PROPELLER_KIND = 1, 2, 3
+
+HULL = {"added_mass": (HEAD, 36), "linear_damping": (HEAD + 36, 36), "quadratic_damping": (HEAD + 72, 36)}
+HULL |= {"displaced_volume": (HEAD + 108, 1), "body_lift": (HEAD + 109, 1), "body_lift_x": (HEAD + 110, 1)}
+HULL |= {"cross_flow_drag": (HEAD + 111, 1), "strip_x": (HEAD + 112, STRIPS), "strip_area": (HEAD + 112 + STRIPS, STRIPS)}
+FIN = {"area": (HEAD, 1), "lift_slope": (HEAD + 1, 1), "stall_angle": (HEAD + 2, 1), "drag": (HEAD + 3, 1)}
+FIN |= {"induced_drag": (HEAD + 4, 1), "normal_drag": (HEAD + 5, 1), "astern_lift": (HEAD + 6, 1)}
+PROPELLER = {"diameter": (HEAD, 1), "thrust_coefficients": (HEAD + 1, 2), "torque_coefficients": (HEAD + 3, 2)}
+PROPELLER |= {"wake_fraction": (HEAD + 5, 1), "thrust_deduction": (HEAD + 6, 1), "swirl_recovery": (HEAD + 7, 1)}
+RECORD = HEAD + 112 + 2 * STRIPS  # numbers a body needs: its `nuser_body`
+
+_VOLUME, _LIFT, _LIFT_X = HULL["displaced_volume"][0], HULL["body_lift"][0], HULL["body_lift_x"][0]
+_CROSS_FLOW, _STRIP_X, _STRIP_AREA = HULL["cross_flow_drag"][0], HULL["strip_x"][0], HULL["strip_area"][0]
+_LINEAR, _QUADRATIC = HULL["linear_damping"][0], HULL["quadratic_damping"][0]
+
+_inline = njit(cache=True, inline="never", error_model="numpy", fastmath=False)
+
+
+@_inline
+def added_momentum(c, o, i, v0, v1, v2, w0, w1, w2):
+    """Row i of `M_A nu`, [kg m/s] or [kg m2/s]."""
+    a = o + HEAD + 6 * i
+    return c[a] * v0 + c[a + 1] * v1 + c[a + 2] * v2 + c[a + 3] * w0 + c[a + 4] * w1 + c[a + 5] * w2
+
+
+@_inline
+def _damped(c, o, i, v0, v1, v2, w0, w1, w2):
+    """Row i of `D nu`; with the products |nu_j| nu_j in place of nu_j, of the quadratic damping."""
+    a = o + 6 * i
+    return c[a] * v0 + c[a + 1] * v1 + c[a + 2] * v2 + c[a + 3] * w0 + c[a + 4] * w1 + c[a + 5] * w2
+
+
+@_inline
+def hull_force(c, o, v0, v1, v2, w0, w1, w2, g1, g2):
+    """Velocity-dependent force and moment of a hull about its origin, without the inertial `-M_A dnu/dt`.
+
+    Coriolis of the added mass (Fossen 2021, eq. 6.44, Kirchhoff), linear and quadratic damping, cross-flow drag by strips
+    (Faltinsen 1990, sec. 6; both transverse velocities share one resultant), and body lift of a slender hull
+    with a separating tail, which changes ends when the flow does.
+
+    Args:
+        c: coefficients, with the record at `o`.
+        v0, v1, v2: velocity of the origin relative to the water [m/s].
+        w0, w1, w2: angular velocity [rad/s].
+        g1, g2: change of the water's y and z velocity per metre along x [1/s].
+
+    Returns:
+        Force (3) [N] and moment (3) [N m] as six numbers.
+    """
+    p0 = added_momentum(c, o, 0, v0, v1, v2, w0, w1, w2)
+    p1 = added_momentum(c, o, 1, v0, v1, v2, w0, w1, w2)
+    p2 = added_momentum(c, o, 2, v0, v1, v2, w0, w1, w2)
+    h0 = added_momentum(c, o, 3, v0, v1, v2, w0, w1, w2)
+    h1 = added_momentum(c, o, 4, v0, v1, v2, w0, w1, w2)
+    h2 = added_momentum(c, o, 5, v0, v1, v2, w0, w1, w2)
+    # -C_A nu = -[omega x p; omega x h + v x p]: the cross product v x p is the Munk moment.
+    f0 = p1 * w2 - p2 * w1
+    f1 = p2 * w0 - p0 * w2
+    f2 = p0 * w1 - p1 * w0
+    m0 = h1 * w2 - h2 * w1 + p1 * v2 - p2 * v1
+    m1 = h2 * w0 - h0 * w2 + p2 * v0 - p0 * v2
+    m2 = h0 * w1 - h1 * w0 + p0 * v1 - p1 * v0
+
+    a, b = o + _LINEAR, o + _QUADRATIC
+    q0, q1, q2 = abs(v0) * v0, abs(v1) * v1, abs(v2) * v2
+    s0, s1, s2 = abs(w0) * w0, abs(w1) * w1, abs(w2) * w2
+    f0 -= _damped(c, a, 0, v0, v1, v2, w0, w1, w2) + _damped(c, b, 0, q0, q1, q2, s0, s1, s2)
+    f1 -= _damped(c, a, 1, v0, v1, v2, w0, w1, w2) + _damped(c, b, 1, q0, q1, q2, s0, s1, s2)
+    f2 -= _damped(c, a, 2, v0, v1, v2, w0, w1, w2) + _damped(c, b, 2, q0, q1, q2, s0, s1, s2)
+    m0 -= _damped(c, a, 3, v0, v1, v2, w0, w1, w2) + _damped(c, b, 3, q0, q1, q2, s0, s1, s2)
+    m1 -= _damped(c, a, 4, v0, v1, v2, w0, w1, w2) + _damped(c, b, 4, q0, q1, q2, s0, s1, s2)
+    m2 -= _damped(c, a, 5, v0, v1, v2, w0, w1, w2) + _damped(c, b, 5, q0, q1, q2, s0, s1, s2)
+
+    k = 0.5 * c[o + DENSITY] * c[o + _CROSS_FLOW]
+    if k > 0.0:
+        r1, r2 = w2 - g1, -w1 - g2  # transverse velocity per metre along x
+        for i in range(STRIPS):
+            area = c[o + _STRIP_AREA + i]
+            if area == 0.0:
+                break
+            x = c[o + _STRIP_X + i]
+            y, z = v1 + x * r1, v2 + x * r2
+            d = k * area * math.sqrt(y * y + z * z)
+            f1 -= d * y
+            f2 -= d * z
+            m1 += x * d * z
+            m2 -= x * d * y
+
+    lift = c[o + _LIFT]
+    y, z = -lift * abs(v0) * v1, -lift * abs(v0) * v2
+    x = math.copysign(c[o + _LIFT_X], v0 * c[o + _LIFT_X])
+    return f0, f1 + y, f2 + z, m0, m1 - x * z, m2 + x * y
+
+
+@_inline
+def fin_force(c, o, v0, v1):
+    """Lift and drag of a fin in the plane across its span, at its hinge axis.
+
+    Attached flow: `C_L = slope sin(alpha) cos(alpha)`, parasitic and induced drag; separated flow: a flat plate's
+    normal force; blended smoothly over +-5 degrees round the stall angle (Beard & McLain 2012, eq. 4.9). The same holds for flow
+    from astern, with a reduced slope (the sharp edge leads).
+
+    Args:
+        c: coefficients, with the record at `o`.
+        v0, v1: the fin's velocity relative to the water along its chord (forward) and its normal [m/s].
+
+    Returns:
+        Force along chord and normal [N].
+    """
+    speed2 = v0 * v0 + v1 * v1
+    if speed2 < 1e-12:
+        return 0.0, 0.0
+    speed = math.sqrt(speed2)
+    ca, sa = v0 / speed, v1 / speed
+    a = o + HEAD
+    slope = c[a + 1] if v0 >= 0.0 else c[a + 1] * c[a + 6]
+    cl = slope * sa * abs(ca)
+    attached_drag = c[a + 3] + c[a + 4] * cl * cl
+    margin = (math.asin(min(1.0, abs(sa))) - c[a + 2]) / 0.0873
+    separated = 0.0 if margin <= -1.0 else 1.0 if margin >= 1.0 else 0.25 * (margin + 1.0) ** 2 * (2.0 - margin)
+    plate = c[a + 5] * sa
+    cl = (1.0 - separated) * cl + separated * plate * abs(ca)
+    cd = (1.0 - separated) * attached_drag + separated * (c[a + 3] + plate * sa)
+    q = 0.5 * c[o + DENSITY] * c[a] * speed2
+    # Lift is across the flow and opposes the normal velocity, drag is against the motion.
+    lift0 = cl * sa if v0 >= 0.0 else -cl * sa
+    return q * (lift0 - cd * ca), q * (-cl * abs(ca) - cd * sa)
+
+
+@_inline
+def propeller_force(c, o, v0, n):
+    """Thrust on the vehicle and torque on the shaft of an open propeller.
+
+    `K_T` and `K_Q` are linear in the advance number J = (1 - w) v0 / (n D) (Fossen 2021, eq. 9.8); where the water meets the
+    propeller from the other side (J < 0) they keep their bollard value.
+
+    Args:
+        c: coefficients, with the record at `o`.
+        v0: speed of the propeller ahead relative to the water [m/s].
+        n: revolutions per second, positive ahead [1/s].
+
+    Returns:
+        Thrust ahead, after thrust deduction [N], and torque that the water puts on the shaft [N m].
+    """
+    a = o + HEAD
+    d = c[a]
+    advance = (1.0 - c[a + 5]) * v0 / d if v0 * n > 0.0 else 0.0
+    scale = c[o + DENSITY] * d * d * d * d * abs(n)
+    thrust = scale * (c[a + 1] * n + c[a + 2] * advance)
+    torque = scale * d * (c[a + 3] * n + c[a + 4] * advance)
+    return (1.0 - c[a + 6]) * thrust, -torque
