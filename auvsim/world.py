@@ -1,0 +1,307 @@
+"""The physical world of a trial: composes the scene, steps MuJoCo, owns its state, and gives `Truth`."""
+
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import mujoco
+import numpy as np
+from dm_control import mjcf
+from pydantic import Field
+
+from auvsim import hydrodynamics, library
+from auvsim.currents import CurrentField
+from auvsim.errors import DivergenceError, InputError
+from auvsim.fluid import WATER
+from auvsim.forces import RECORD
+from auvsim.frames import Array, euler_to_quaternion, flip, flip_matrix, flip_quaternion, quaternion_to_euler
+from auvsim.settings import Settings
+from auvsim.truth import Truth
+
+NEAR = 4.0  # distance from the dock's mouth within which contact is looked for at every physics tick [m]
+
+
+class WorldSettings(Settings):
+    """What surrounds the vehicle."""
+
+    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
+        "implicitfast", description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one"
+    )
+    water_density: float = Field(hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
+    sea_floor: float = Field(40.0, gt=0, description="depth of the sea floor [m]")
+
+
+@dataclass(frozen=True, kw_only=True)
+class DockPose:
+    """Where the dock is; its mouth lies below the origin of NED."""
+
+    depth: float  # of the centre of the mouth [m]
+    heading: float  # course of a vehicle that enters [rad]
+
+
+class Contact(NamedTuple):
+    """Contact between vehicle and surroundings during one physics tick."""
+
+    time: float  # [s]
+    force: float  # sum of the magnitudes of the contact forces [N]
+
+
+def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settings: WorldSettings, rate: float) -> Any:
+    """The scene as one PyMJCF model: sea floor, dock, vehicle with a free joint, and the open latch between them.
+
+    Args:
+        rate: physics steps per second [Hz].
+    """
+    root = mjcf.RootElement(model="trial")
+    root.compiler.angle = "radian"
+    root.size.nuser_body, root.size.nuserdata = RECORD, WATER
+    root.option.timestep, root.option.integrator = 1.0 / rate, settings.integrator
+    root.option.flag.autoreset = "disable"  # a diverging simulation must be seen, not restarted
+    root.visual.map.znear, root.visual.map.zfar = 0.002, 4.0
+    root.visual.quality.shadowsize = 0  # software drawing: shadows cost 200 ms a frame
+    getattr(root.visual, "global").offwidth, getattr(root.visual, "global").offheight = 1920, 1080
+    root.statistic.extent, root.statistic.center = 100.0, (0, 0, -pose.depth)
+    root.asset.add(
+        "texture",
+        name="sand",
+        type="2d",
+        builtin="checker",
+        rgb1=(0.62, 0.57, 0.45),
+        rgb2=(0.56, 0.51, 0.40),
+        width=256,
+        height=256,
+    )
+    root.asset.add("material", name="sand", texture="sand", texrepeat=(60, 60), specular=0, shininess=0)
+    root.asset.add(
+        "texture",
+        name="water",
+        type="skybox",
+        builtin="gradient",
+        rgb1=(0.12, 0.42, 0.55),
+        rgb2=(0.02, 0.12, 0.22),
+        width=64,
+        height=64,
+    )
+    root.worldbody.add(
+        "light",
+        name="sun",
+        directional=True,
+        pos=(0, 0, 0),
+        dir=(0.2, 0.1, -1),
+        diffuse=(0.8, 0.85, 0.9),
+        castshadow=False,
+    )
+    root.worldbody.add(
+        "geom", name="sea_floor", type="plane", size=(600, 600, 1), pos=(0, 0, -settings.sea_floor), material="sand"
+    )
+    quaternion = flip_quaternion(euler_to_quaternion(0.0, 0.0, pose.heading))
+    place = root.worldbody.add("site", name="dock", pos=(0, 0, -pose.depth), quat=quaternion, rgba=(0, 0, 0, 0))
+    place.attach(dock.root)
+    if settings.sea_floor > pose.depth + 1.6:
+        x = dock.cone_length + 0.3
+        root.worldbody.add(
+            "geom", name="pillar", type="cylinder", size=(0.12,), contype=0, conaffinity=0, group=1, rgba=(0.35, 0.38, 0.42, 1),
+            fromto=(x * np.cos(pose.heading), -x * np.sin(pose.heading), -pose.depth - 1.6,
+                    x * np.cos(pose.heading), -x * np.sin(pose.heading), -settings.sea_floor),
+        )  # fmt: skip
+    frame = root.worldbody.attach(vehicle.root)
+    frame.add("freejoint")
+    root.sensor.add(
+        "insidesite", name="captured", objtype="site", objname=f"{vehicle.name}/nose", site=f"{dock.name}/capture"
+    )
+    root.equality.add(
+        "weld",
+        name="latch",
+        site1=f"{dock.name}/latched",
+        site2=f"{vehicle.name}/nose",
+        active=False,
+        solref=(0.15, 1.0), solimp=(0.1, 0.1, 0.001),
+    )
+    return root
+
+
+def compile_scene(root: Any) -> mujoco.MjModel:
+    """Compiles a composed scene.
+
+    Raises:
+        InputError: MuJoCo refuses it; the text has its reason.
+    """
+    try:
+        return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    except ValueError as error:
+        raise InputError(f"scene '{root.model}': {' '.join(str(error).split())[:300]}") from None
+
+
+class World:
+    """One vehicle, one dock and the water, stepped by MuJoCo.
+
+    Args:
+        model: the compiled scene; gets its hydrodynamics here.
+        data: its state.
+        vehicle: the vehicle in it.
+        pose: where the dock is.
+        current: what the water does.
+        water_density: [kg/m3].
+    """
+
+    def __init__(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        vehicle: library.Vehicle,
+        pose: DockPose,
+        current: CurrentField,
+        water_density: float = hydrodynamics.SEA_WATER,
+    ) -> None:
+        self.model, self.data, self.vehicle, self.pose = model, data, vehicle, pose
+        self._current = current
+        self._slot = hydrodynamics.equip(model, water_density)[f"{vehicle.name}/"]
+        self._floor = -float(model.geom("sea_floor").pos[2])
+        joint = model.joint(f"{vehicle.name}/")
+        self._q, self._v = int(joint.qposadr[0]), int(joint.dofadr[0])
+        fins = [model.actuator(f"{vehicle.name}/{fin}") for fin in vehicle.allocation.names]
+        shaft = model.actuator(f"{vehicle.name}/shaft")
+        self._fin_controls = [int(fin.id) for fin in fins]
+        self._fin_q = np.array([model.jnt_qposadr[fin.trnid[0]] for fin in fins])
+        self._shaft_control, self._shaft_v = int(shaft.id), int(model.jnt_dofadr[shaft.trnid[0]])
+        self._captured = int(model.sensor("captured").adr[0])
+        self._latch = int(model.equality("latch").id)
+        self._force = np.zeros(6)
+        self.contacts: list[Contact] = []
+
+    @classmethod
+    def build(
+        cls,
+        vehicle: library.Vehicle,
+        dock: library.Dock,
+        pose: DockPose,
+        current: CurrentField,
+        settings: WorldSettings,
+        rate: float,
+    ) -> "World":
+        """Composes and compiles the scene and puts the world round it."""
+        model = compile_scene(compose(vehicle, dock, pose, settings, rate))
+        return cls(model, mujoco.MjData(model), vehicle, pose, current, settings.water_density)
+
+    @property
+    def time(self) -> float:
+        """Time since the start [s]."""
+        return self.data.time
+
+    @property
+    def latched(self) -> bool:
+        """Whether the dock's latch holds the vehicle."""
+        return bool(self.data.eq_active[self._latch])
+
+    def place(self, position: Array, heading: float, speed: float, shaft_speed: float) -> None:
+        """Resets to time zero with the vehicle level at a place, moving ahead through the water.
+
+        Args:
+            position: (3,) NED [m].
+            heading: [rad].
+            speed: through the water [m/s].
+            shaft_speed: [rad/s].
+
+        Raises:
+            InputError: the place is out of the water or below the sea floor.
+        """
+        if not 0.0 < position[2] < self._floor:
+            raise InputError(
+                f"start depth {position[2]:g} m is not between the surface and the sea floor at {self._floor:g} m"
+            )
+        mujoco.mj_resetData(self.model, self.data)
+        self.contacts.clear()
+        q, v = self._q, self._v
+        water = self._current.evaluate(0.0, np.asarray(position, dtype=float)).velocity
+        ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
+        self.data.qpos[q : q + 3] = flip(position)
+        self.data.qpos[q + 3 : q + 7] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
+        self.data.qvel[v : v + 3] = flip(speed * ahead + water)
+        self.data.qvel[self._shaft_v] = shaft_speed
+        self.data.ctrl[self._shaft_control] = shaft_speed
+        self.refresh_water()
+        mujoco.mj_forward(self.model, self.data)
+
+    def refresh_water(self) -> None:
+        """Writes the local expansion of the current round the vehicle where the fluid callback reads it."""
+        position = self.data.qpos[self._q : self._q + 3]
+        water = self._current.evaluate(self.data.time, flip(position))
+        slot = self.data.userdata[self._slot : self._slot + WATER]
+        slot[0] = self.data.time
+        slot[1:4] = position
+        slot[4:7] = flip(water.velocity)
+        slot[7:10] = flip(water.derivative)
+        slot[10:19] = flip_matrix(water.gradient).ravel()
+
+    def command(self, rudder: float, elevator: float, shaft_speed: float) -> None:
+        """Sets effective rudder and elevator [rad] and shaft speed [rad/s]; servos and shaft follow with their lags."""
+        control = self.data.ctrl
+        for index, angle in zip(self._fin_controls, self.vehicle.allocation.fins(rudder, elevator), strict=True):
+            control[index] = angle
+        control[self._shaft_control] = shaft_speed
+
+    def advance(self, ticks: int) -> None:
+        """Steps the physics.
+
+        Near the dock or the sea floor, contacts are recorded and the latch may close at every tick.
+
+        Raises:
+            DivergenceError: the state is no longer finite and physical.
+        """
+        if not self._current.steady_uniform:
+            self.refresh_water()
+        x, y, z = self.data.qpos[self._q : self._q + 3].tolist()
+        near = x * x + y * y + (z + self.pose.depth) ** 2 < NEAR**2 or z < 2.0 - self._floor
+        if near:
+            for _ in range(ticks):
+                mujoco.mj_step(self.model, self.data)
+                self._watch()
+        else:
+            mujoco.mj_step(self.model, self.data, ticks)
+        energy = float(self.data.qvel @ self.data.qvel)
+        if not energy < 1e6:
+            raise DivergenceError(self._diagnosis())
+
+    def _watch(self) -> None:
+        """Records contact and closes the latch when the nose is in the throat."""
+        data = self.data
+        if data.ncon:
+            total = 0.0
+            for i in range(data.ncon):
+                if data.contact.efc_address[i] >= 0:
+                    mujoco.mj_contactForce(self.model, data, i, self._force)
+                    total += float(np.linalg.norm(self._force[:3]))
+            if total > 0.0:
+                self.contacts.append(Contact(data.time, total))
+        if data.sensordata[self._captured] > 0.5 and not self.latched:
+            data.eq_active[self._latch] = 1
+
+    def _diagnosis(self) -> str:
+        speeds = np.abs(np.nan_to_num(self.data.qvel, nan=np.inf))
+        worst = int(speeds.argmax())
+        joint = self.model.joint(int(self.model.dof_jntid[worst])).name
+        step = self.model.opt.timestep
+        return (
+            f"diverged at {self.data.time:.2f} s: joint '{joint}' moves at {speeds[worst]:.3g} (m/s or rad/s); "
+            f"check the model's inertia and damping, or raise rates.physics above {1 / step:.0f} Hz"
+        )
+
+    def truth(self) -> Truth:
+        """The true state now, in NED and forward-starboard-down."""
+        data, q, v = self.data, self._q, self._v
+        position = flip(data.qpos[q : q + 3])
+        quaternion = flip_quaternion(data.qpos[q + 3 : q + 7])
+        rotation = np.empty(9)
+        mujoco.mju_quat2Mat(rotation, quaternion)
+        nu = np.empty(6)
+        nu[:3] = flip(data.qvel[v : v + 3]) @ rotation.reshape(3, 3)
+        nu[3:] = flip(data.qvel[v + 3 : v + 6])
+        return Truth(
+            time=data.time,
+            position=position,
+            quaternion=quaternion,
+            attitude=quaternion_to_euler(quaternion),
+            nu=nu,
+            current=self._current.evaluate(data.time, position).velocity,
+            fins=data.qpos[self._fin_q],
+            shaft_speed=float(data.qvel[self._shaft_v]),
+        )
