@@ -274,7 +274,23 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
                     touched = True
                 gravity = _numbers(m + gravity_at)
                 _hull(
-                    c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, dofadr[base], qfrc, M, rows, J
+                    c,
+                    o,
+                    body,
+                    water,
+                    time,
+                    gravity,
+                    xpos,
+                    xmat,
+                    cvel,
+                    com,
+                    cdof,
+                    parent,
+                    dofadr[base],
+                    qfrc,
+                    M,
+                    rows,
+                    J,
                 )
             elif kind == FIN_KIND or kind == PROPELLER_KIND:
                 dof = dofadr[base] + dofnum[base] - 1

@@ -17,7 +17,11 @@ HULL_KIND, FIN_KIND, PROPELLER_KIND = 1, 2, 3
 
 HULL = {"added_mass": (HEAD, 36), "linear_damping": (HEAD + 36, 36), "quadratic_damping": (HEAD + 72, 36)}
 HULL |= {"displaced_volume": (HEAD + 108, 1), "body_lift": (HEAD + 109, 1), "body_lift_x": (HEAD + 110, 1)}
-HULL |= {"cross_flow_drag": (HEAD + 111, 1), "strip_x": (HEAD + 112, STRIPS), "strip_area": (HEAD + 112 + STRIPS, STRIPS)}
+HULL |= {
+    "cross_flow_drag": (HEAD + 111, 1),
+    "strip_x": (HEAD + 112, STRIPS),
+    "strip_area": (HEAD + 112 + STRIPS, STRIPS),
+}
 FIN = {"area": (HEAD, 1), "lift_slope": (HEAD + 1, 1), "stall_angle": (HEAD + 2, 1), "drag": (HEAD + 3, 1)}
 FIN |= {"induced_drag": (HEAD + 4, 1), "normal_drag": (HEAD + 5, 1), "astern_lift": (HEAD + 6, 1)}
 PROPELLER = {"diameter": (HEAD, 1), "thrust_coefficients": (HEAD + 1, 2), "torque_coefficients": (HEAD + 3, 2)}

@@ -84,7 +84,9 @@ def _check(index: int, name: str, fields: dict[str, Array]) -> Body:
         count = table[field][1]
         if field.startswith("strip_"):
             if value.size > STRIPS or value.size != fields.get("strip_x", value).size:
-                raise InputError(f"'{name}_{field}' has {value.size} numbers; strip_x and strip_area want as many, <= {STRIPS}")
+                raise InputError(
+                    f"'{name}_{field}' has {value.size} numbers; strip_x and strip_area want as many, <= {STRIPS}"
+                )
         elif value.size != count:
             raise InputError(f"'{name}_{field}' has {value.size} numbers instead of {count}")
         if not np.all(np.isfinite(value)):
@@ -143,7 +145,9 @@ def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
         slot = slots.setdefault(model.body(base).name, fluid.WATER * len(slots))
         model.body_user[body.index, :RECORD] = _record(body, slot, density)
     if model.nuserdata < fluid.WATER * len(slots):
-        raise InputError(f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}")
+        raise InputError(
+            f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}"
+        )
     fluid.install()
     _weigh_constraints(model)
     return slots
@@ -155,12 +159,16 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
     if model.opt.density or model.opt.viscosity:
         raise InputError("option density and viscosity must be 0: MuJoCo's own fluid model would act as well")
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
-        raise InputError("the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up")
+        raise InputError(
+            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up"
+        )
     for body in elements:
         base, weld = model.body_rootid[body.index], model.body_weldid[body.index]
         free = model.body_dofnum[base] == 6 and model.jnt_type[model.body_jntadr[base]] == mujoco.mjtJoint.mjJNT_FREE
         if not free or (body.kind == "hull" and weld != base):
-            raise InputError(f"{body.kind} '{body.name}' is not on a body with a free joint (hulls must be fixed to it)")
+            raise InputError(
+                f"{body.kind} '{body.name}' is not on a body with a free joint (hulls must be fixed to it)"
+            )
         if body.kind == "propeller" and (weld == base or model.body_dofnum[weld] != 1):
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
         if body.kind == "hull" and model.body_simple[base]:

@@ -68,6 +68,8 @@ def verify() -> None:
             found = ctypes.c_void_p.from_address(owner._address + offsets(struct)[name]).value
             if found != getattr(owner, name).ctypes.data:
                 raise AuvsimError(f"MuJoCo {mujoco.__version__}: {struct}.{name} is not where its introspection says")
-    gravity = (ctypes.c_double * 3).from_address(model._address + offsets("mjModel")["opt"] + offsets("mjOption")["gravity"])
+    gravity = (ctypes.c_double * 3).from_address(
+        model._address + offsets("mjModel")["opt"] + offsets("mjOption")["gravity"]
+    )
     if list(gravity) != list(model.opt.gravity):
         raise AuvsimError(f"MuJoCo {mujoco.__version__}: mjOption.gravity is not where its introspection says")

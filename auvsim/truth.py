@@ -1,4 +1,4 @@
-"""What a world says of its vehicle: the state that sensors measure and logs keep."""
+"""What a world says of its vehicle and its dock: the state that sensors measure and logs keep."""
 
 from dataclasses import dataclass
 
@@ -20,3 +20,13 @@ class Truth:
     current: Array  # (3,) water velocity at the body origin, NED [m/s]
     fins: Array  # (n,) fin angles, in the order of the vehicle's allocation [rad]
     shaft_speed: float  # propeller shaft speed [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class DockPose:
+    """Where the dock truly is: the centre of its mouth is at (0, 0, depth) in NED."""
+
+    depth: float  # of the centre of the mouth [m]
+    heading: float  # course of a vehicle that enters [rad]
+    pitch: float = 0.0  # [rad]
+    roll: float = 0.0  # [rad]

@@ -1,6 +1,5 @@
 """The physical world of a trial: composes the scene, steps MuJoCo, owns its state, and gives `Truth`."""
 
-from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import mujoco
@@ -15,7 +14,7 @@ from auvsim.fluid import WATER
 from auvsim.forces import RECORD
 from auvsim.frames import Array, euler_to_quaternion, flip, flip_matrix, flip_quaternion, quaternion_to_euler
 from auvsim.settings import Settings
-from auvsim.truth import Truth
+from auvsim.truth import DockPose, Truth
 
 NEAR = 4.0  # distance from the dock's mouth within which contact is looked for at every physics tick [m]
 
@@ -28,14 +27,6 @@ class WorldSettings(Settings):
     )
     water_density: float = Field(hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
     sea_floor: float = Field(40.0, gt=0, description="depth of the sea floor [m]")
-
-
-@dataclass(frozen=True, kw_only=True)
-class DockPose:
-    """Where the dock is; its mouth lies below the origin of NED."""
-
-    depth: float  # of the centre of the mouth [m]
-    heading: float  # course of a vehicle that enters [rad]
 
 
 class Contact(NamedTuple):
@@ -93,7 +84,7 @@ def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settin
     root.worldbody.add(
         "geom", name="sea_floor", type="plane", size=(600, 600, 1), pos=(0, 0, -settings.sea_floor), material="sand"
     )
-    quaternion = flip_quaternion(euler_to_quaternion(0.0, 0.0, pose.heading))
+    quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
     place = root.worldbody.add("site", name="dock", pos=(0, 0, -pose.depth), quat=quaternion, rgba=(0, 0, 0, 0))
     place.attach(dock.root)
     if settings.sea_floor > pose.depth + 1.6:
@@ -114,7 +105,8 @@ def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settin
         site1=f"{dock.name}/latched",
         site2=f"{vehicle.name}/nose",
         active=False,
-        solref=(0.15, 1.0), solimp=(0.1, 0.1, 0.001),
+        solref=(0.15, 1.0),
+        solimp=(0.1, 0.1, 0.001),
     )
     return root
 

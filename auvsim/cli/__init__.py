@@ -1,0 +1,140 @@
+"""The command `auvsim`."""
+
+import contextlib
+import io
+import os
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from auvsim import __version__
+from auvsim.cli.renderer import choose_renderer
+from auvsim.errors import AuvsimError, InputError
+
+# What draws and computes is imported when a command needs it, so that `--help` answers at once.
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dock:
+    """Runs one docking trial.
+
+    Any key of the scenario is an option too, such as `--current.speed 0.2`; `auvsim scenario --default` lists them.
+    What a file or an option gives is pinned; the rest of the default scenario is drawn from the seed. Exit codes: 0
+    the trial ran, docked or not; 1 the simulation diverged; 2 bad input; 130 interrupted.
+    """
+
+    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
+    """What to pin, as YAML."""
+    seed: int = 0
+    """Seed of every random number."""
+    trial: int = 0
+    """Number of the trial under that seed."""
+    out: Path = Path("out")
+    """Folder of trial.nc, summary.json, track.png, estimates.png and docking.mp4."""
+    estimator: Annotated[str | None, tyro.conf.arg(metavar="NAME|PACKAGE.MODULE:FACTORY")] = None
+    """Estimator that navigates; the same as --estimator.factory."""
+    video: bool = True
+    """Whether to draw docking.mp4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Video:
+    """Draws docking.mp4 beside a log."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
+    """Log of a trial."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Plot:
+    """Draws track.png and estimates.png beside a log."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
+    """Log of a trial."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Metrics:
+    """Writes summary.json beside a log and prints it."""
+
+    log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
+    """Log of a trial."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScenarioText:
+    """Prints the full scenario as commented YAML: the default one, or what a file and options make of it."""
+
+    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
+    """What to pin, as YAML."""
+    default: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """The default scenario as installed."""
+
+
+Command = Dock | Video | Plot | Metrics | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
+TAKE_SCENARIO_KEYS = {"dock": Dock, "scenario": ScenarioText}
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the command line and returns its exit code."""
+    arguments = list(sys.argv[1:] if arguments is None else arguments)
+    if arguments == ["--version"]:
+        print(f"auvsim {__version__}")
+        return 0
+    try:
+        return _run(arguments)
+    except AuvsimError as error:
+        print(f"auvsim: {' '.join(str(error).split())}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        print("auvsim: interrupted", file=sys.stderr)
+        return 130
+    except BrokenPipeError:  # the reader, such as `head`, has what it wanted
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    choose_renderer()
+    values: dict = {}
+    if arguments and arguments[0] in TAKE_SCENARIO_KEYS and not {"-h", "--help"} & set(arguments):
+        from auvsim.cli import options
+
+        arguments, values = options.split(arguments, TAKE_SCENARIO_KEYS[arguments[0]])
+    command = _parse(arguments)
+    if isinstance(command, ScenarioText):
+        from auvsim.cli import options
+
+        print(options.scenario_text(command.scenario, command.default, values), end="")
+        return 0
+
+    if isinstance(command, Dock):
+        from auvsim.cli import dock, options
+
+        scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
+        return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+
+    from auvsim.cli import drawing
+
+    return drawing.again(command.log, type(command).__name__.lower())
+
+
+def _parse(arguments: list[str]) -> Command:
+    """The command that the arguments name; tyro's boxed complaint becomes one line."""
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.cli(Command, prog="auvsim", args=arguments, description=_DESCRIPTION)  # pyright: ignore
+    except SystemExit as leave:
+        if not leave.code:
+            raise
+        lines = [line.strip("│ ") for line in complaint.getvalue().splitlines()[1:]]
+        rule = next((index for index, line in enumerate(lines) if line.startswith("─")), len(lines))
+        raise InputError(f"{' '.join(lines[:rule]).rstrip('.')}; see auvsim --help") from None
+
+
+_DESCRIPTION = "Closed-loop docking trials of autonomous underwater vehicles. `auvsim --version` prints the version."

@@ -1,0 +1,88 @@
+"""`auvsim dock`: checks everything, runs one trial, leaves whole files."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryFile
+
+from auvsim.cli import drawing, report
+from auvsim.errors import InputError
+from auvsim.log import TrialLog, write
+from auvsim.scenario import Scenario
+
+PRODUCTS = ("summary.json", "track.png", "estimates.png", "docking.mp4")  # made from trial.nc
+
+
+def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool) -> int:
+    """Runs the trial, fills the folder and returns the exit code."""
+    with output_folder(out):
+        log = _trial(scenario, seed, trial)
+        path = out / "trial.nc"
+        write(log, path)
+        for name in PRODUCTS:  # what an earlier trial left would not belong to this log
+            (out / name).unlink(missing_ok=True)
+    status = log.attributes["status"]
+    if status == "interrupted":
+        print(f"auvsim: interrupted; {path} holds the trial up to there", file=sys.stderr)
+        return 130
+    values = drawing.summary(log, out)
+    if status == "diverged":
+        print(f"auvsim: {diagnosis(log)}; {path} holds the trial up to there", file=sys.stderr)
+        return 1
+    drawing.plots(log, out)
+    if video:
+        _video(log, out)
+    report.table(values)
+    return 0
+
+
+def diagnosis(log: TrialLog) -> str:
+    """Why a trial diverged, from its log."""
+    event = log["event"]
+    texts = [text for kind, text in zip(event["kind"], event["text"], strict=True) if kind == "diverged"]
+    return str(texts[-1]) if texts else "the simulation diverged"
+
+
+@contextmanager
+def output_folder(path: Path) -> Iterator[None]:
+    """Makes the folder and sees that it can be written to; if what follows fails, an empty new one goes again.
+
+    Raises:
+        InputError: If it is no folder or cannot be written to.
+    """
+    new = [folder for folder in (path, *path.parents) if not folder.exists()]
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=path):
+            pass
+    except OSError as error:
+        reason = "it is a file, not a folder" if path.is_file() else (error.strerror or str(error)).lower()
+        raise InputError(f"{path}: cannot be written to: {reason}; give another folder with --out") from None
+    try:
+        yield
+    except BaseException:
+        for folder in new:
+            if not any(folder.iterdir()):
+                folder.rmdir()
+        raise
+
+
+def _trial(scenario: Scenario, seed: int, trial: int) -> TrialLog:
+    from auvsim import fluid
+    from auvsim.trial import run_trial
+
+    if not fluid.is_warm():
+        with report.waiting("compiling the hydrodynamics (this once; later runs find it in the cache)"):
+            fluid.install()
+    with report.TrialProgress() as progress:
+        return run_trial(scenario, seed=seed, trial=trial, progress=progress)
+
+
+def _video(log: TrialLog, out: Path) -> None:
+    from auvsim.video import DrawingError
+
+    try:
+        drawing.video(log, out)
+    except DrawingError:
+        print(drawing.NO_OPENGL.format(log=out / "trial.nc"), file=sys.stderr)

@@ -1,0 +1,62 @@
+"""What a log is turned into: plots, video and summary, each written whole or not at all."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+from auvsim.errors import InputError
+from auvsim.files import whole
+from auvsim.log import TrialLog, read
+
+NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `auvsim video {log}` makes it"
+
+
+def plots(log: TrialLog, folder: Path) -> None:
+    """Draws track.png and estimates.png."""
+    from auvsim import plots
+
+    for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
+        with whole(folder / name) as partial:
+            draw(log, partial)
+
+
+def video(log: TrialLog, folder: Path) -> None:
+    """Draws docking.mp4, with a progress bar.
+
+    Raises:
+        DrawingError: Without OpenGL.
+    """
+    from auvsim import video
+    from auvsim.cli.report import VideoProgress
+
+    with VideoProgress() as progress, whole(folder / "docking.mp4") as partial:
+        video.render(log, partial, progress=progress)
+
+
+def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
+    """Writes summary.json and returns what it holds."""
+    from auvsim import metrics
+
+    values = metrics.summarise(log).to_dict()
+    with whole(folder / "summary.json") as partial:
+        partial.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    return values
+
+
+def again(path: Path, what: str) -> int:
+    """Makes the video, the plots or the metrics of a log again, beside it."""
+    if path.is_dir():
+        path = path / "trial.nc"
+    log = read(path)
+    try:
+        if what == "video":
+            video(log, path.parent)
+        elif what == "plot":
+            plots(log, path.parent)
+        else:
+            from auvsim.cli.report import table
+
+            table(summary(log, path.parent))
+    except OSError as error:
+        raise InputError(f"{path.parent}: cannot be written: {error.strerror or error}") from None
+    return 0

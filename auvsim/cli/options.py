@@ -1,0 +1,110 @@
+"""The scenario of a command line: the default plan, a YAML file on top, keys given as options on top of that."""
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from auvsim import sampling, schema, yaml_text
+from auvsim.errors import InputError
+from auvsim.scenario import Scenario, parse
+
+PLACE = "command line"
+
+
+def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
+    """Parts the command's own arguments from the keys of the scenario, which become nested values.
+
+    `--current.speed 0.2` and `--current.speed=0.2` are keys; the value is YAML. Hyphens stand for underscores.
+
+    Raises:
+        InputError: For an option that is neither, a key without a value, or values that exclude each other.
+    """
+    own = {name: kind is not bool for name, kind in get_type_hints(command).items()}  # name: whether it takes a value
+    rest: list[str] = []
+    values: dict = {}
+    tokens = iter(arguments)
+    for token in tokens:
+        if not token.startswith("--"):
+            rest.append(token)
+            continue
+        name, equals, text = token[2:].partition("=")
+        key = name.replace("-", "_")
+        if key.removeprefix("no_") in own:
+            rest.append(token)
+            if own.get(key) and not equals and (value := next(tokens, None)) is not None:
+                rest.append(value)
+            continue
+        _check(key, name, list(own))
+        if not equals:
+            text = next(tokens, "")
+        if not text or (not equals and text.startswith("--")):
+            raise InputError(f"{PLACE}: --{name} needs a value, such as --{name} 1.0")
+        _put(values, key, yaml_text.read(text, f"--{name}").value)
+    return rest, values
+
+
+def scenario(path: Path | None, estimator: str | None, values: Mapping, seed: int, trial: int) -> Scenario:
+    """The definite scenario of one trial.
+
+    Raises:
+        InputError: One line with the file and line, or the option, at fault.
+    """
+    plan, places = _plan(path, values, estimator)
+    return parse(sampling.draw(plan, seed, trial, places), places)
+
+
+def scenario_text(path: Path | None, default: bool, values: Mapping) -> str:
+    """The plan that a file and options make of the default one, checked, as commented YAML.
+
+    Raises:
+        InputError: If it cannot be used, or `default` comes with either.
+    """
+    if default and (path or values):
+        raise InputError("scenario --default: takes no file and no keys; leave --default out to see what they make")
+    plan, places = _plan(path, values, None)
+    parse(sampling.draw(plan, 0, 0, places), places)
+    return schema.commented(Scenario, plan)
+
+
+def _plan(path: Path | None, values: Mapping, estimator: str | None) -> tuple[dict, dict[str, str]]:
+    plan, places = sampling.default_plan(), {}
+    if path is not None:
+        pinned, places = sampling.load_plan(path)
+        plan = sampling.merge(plan, pinned)
+    if estimator is not None:
+        values = sampling.merge({"estimator": {"factory": estimator}}, values)
+    return sampling.merge(plan, values), {**places, **dict.fromkeys(_paths(values), PLACE)}
+
+
+def _check(key: str, name: str, own: list[str]) -> None:
+    """Refuses an option that is no key of the scenario."""
+    known = list(dict.fromkeys(schema.keys(Scenario)))
+    # Below a value may stand a distribution or what a mapping of free form holds: `parse` judges those.
+    values = [other for other in known if not any(below.startswith(f"{other}.") for below in known)]
+    if key in known or any(key.startswith(f"{value}.") for value in values):
+        return
+    siblings = [other for other in known if other.count(".") == key.count(".")]
+    near = get_close_matches(key, [*own, *siblings], n=1)
+    hint = f"did you mean --{near[0]}?" if near else schema.suggestion(key, Scenario, [])
+    raise InputError(f"{PLACE}: no option or scenario key --{name}; {hint}")
+
+
+def _put(values: dict, key: str, value: Any) -> None:
+    *above, last = key.split(".")
+    for part in above:
+        values = values.setdefault(part, {})
+        if not isinstance(values, dict):
+            raise InputError(f"{PLACE}: --{key} contradicts the value given to a key above it")
+    if isinstance(value, dict) and isinstance(values.get(last), dict):
+        value = sampling.merge(values[last], value)
+    values[last] = value
+
+
+def _paths(values: Mapping, prefix: str = "") -> list[str]:
+    """The dotted keys of nested values."""
+    return [
+        path
+        for key, value in values.items()
+        for path in (f"{prefix}{key}", *(_paths(value, f"{prefix}{key}.") if isinstance(value, Mapping) else ()))
+    ]

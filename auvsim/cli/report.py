@@ -1,0 +1,111 @@
+"""What a command shows while it works and when it is done."""
+
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, Protocol
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+PERIOD = 0.1  # wall-clock time between two updates of a bar [s]; more often would slow the trial
+
+
+class ProgressState(Protocol):
+    """What a running trial says of itself."""
+
+    time: float  # simulated time [s]
+    duration: float  # time limit [s]
+    phase: str
+    range: float  # true distance to the dock's mouth [m]
+
+
+class _Bar:
+    """A bar on standard error that goes away when done; nothing where there is no terminal."""
+
+    def __init__(self, name: str) -> None:
+        console = Console(stderr=True)
+        columns = (TextColumn(name), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
+        self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+        self._task = self._progress.add_task(name, total=None, text="")
+        self._next = 0.0
+
+    def __enter__(self) -> Any:
+        self._progress.start()
+        return self
+
+    def __exit__(self, *reason: object) -> None:
+        self._progress.stop()
+
+    def _show(self, done: float, total: float, text: str) -> None:
+        now = time.monotonic()
+        if now >= self._next or done >= total:
+            self._next = now + PERIOD
+            self._progress.update(self._task, completed=done, total=total, text=text)
+
+
+class TrialProgress(_Bar):
+    """Bar of a running trial: phase, range, simulated time."""
+
+    def __init__(self) -> None:
+        super().__init__("docking")
+
+    def __call__(self, state: ProgressState) -> None:
+        self._show(state.time, state.duration, f"{state.phase}  {state.range:6.1f} m  {state.time:6.1f} s")
+
+
+class VideoProgress(_Bar):
+    """Bar of a video being drawn."""
+
+    def __init__(self) -> None:
+        super().__init__("video")
+
+    def __call__(self, done: int, total: int) -> None:
+        self._show(done, total, f"{done}/{total} frames")
+
+
+@contextmanager
+def waiting(text: str) -> Iterator[None]:
+    """Says what takes long; always, since nothing else shows that the program is alive."""
+    console = Console(stderr=True)
+    console.print(text)
+    with console.status(text):
+        yield
+
+
+ROWS = {  # key of the summary: what the table calls it
+    "docked": "docked",
+    "failure_text": "because",
+    "attempts": "attempts",
+    "time": "time [s]",
+    "miss_distance": "miss distance at the entrance [m]",
+    "heading_error_deg": "heading error at the entrance [deg]",
+    "contact_impulse": "contact impulse [N s]",
+    "peak_contact_force": "largest contact force [N]",
+    "fixes_sent": "fixes sent",
+    "fixes_lost": "fixes lost",
+    "fixes_refused": "fixes refused",
+    "real_time_factor": "simulated over wall-clock time",
+}
+
+
+def table(summary: Mapping[str, Any]) -> None:
+    """Prints a summary as one table: the verdict, then the errors of the estimate by phase."""
+    table = Table("", "", title="docking trial", show_header=False)
+    for key, label in ROWS.items():
+        if summary[key] is not None:
+            table.add_row(label, _text(summary[key]))
+    for phase, quality in summary["estimate"].items():
+        error = f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}"
+        where = "all phases" if phase == "all" else phase.replace("_", " ")
+        table.add_row(f"position error rms [m], its NEES per axis: {where}", error)
+    Console().print(table)
+
+
+def _text(value: Any) -> str:
+    if value is None:
+        return "-"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.3g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,124 @@
+"""Autopilot: heading, depth (through pitch) and open-loop water speed, from the compass and the depth gauge alone."""
+
+import math
+from collections.abc import Sequence
+
+from pydantic import Field
+
+from auvsim.condense import steady_shaft_speed
+from auvsim.frames import wrap
+from auvsim.navigation import Commands
+from auvsim.sensors.reading import Reading
+from auvsim.settings import Settings
+from estimators.planar_model import PlanarParameters
+
+
+class ControlSettings(Settings):
+    """Gains of the autopilot."""
+
+    heading_gain: float = Field(2.0, gt=0, description="rudder per heading error")
+    yaw_rate_gain: float = Field(2.5, ge=0, description="rudder per yaw rate [s]")
+    pitch_gain: float = Field(2.5, gt=0, description="stern plane per pitch error")
+    pitch_rate_gain: float = Field(2.0, ge=0, description="stern plane per pitch rate [s]")
+    depth_gain: float = Field(0.12, gt=0, description="pitch per depth error [rad/m]")
+    depth_integral_gain: float = Field(0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
+    pitch_limit_deg: float = Field(20.0, gt=0, le=45, description="largest commanded pitch [deg]")
+
+
+class _Smoother:
+    """Alpha-beta filter of a sampled quantity and its rate (Bar-Shalom 2001, sec. 6.5)."""
+
+    def __init__(self, tracking_index: float, angle: bool) -> None:
+        damping = (4 + tracking_index - math.sqrt(8 * tracking_index + tracking_index**2)) / 4
+        self._alpha = 1 - damping**2
+        self._beta = 2 * (2 - self._alpha) - 4 * math.sqrt(1 - self._alpha)
+        self._angle = angle
+        self.value: float | None = None
+        self.rate = 0.0
+        self._stamp = 0.0
+
+    def update(self, stamp: float, measured: float) -> None:
+        if self.value is None:
+            self.value, self._stamp = measured, stamp
+            return
+        dt = stamp - self._stamp
+        if dt <= 0.0:
+            return
+        innovation = measured - self.value - self.rate * dt
+        if self._angle:
+            innovation = wrap(innovation)
+        self.value += self.rate * dt + self._alpha * innovation
+        self.rate += self._beta * innovation / dt
+        self._stamp = stamp
+
+
+class Autopilot:
+    """Turns commanded heading, depth and speed into rudder, stern plane and shaft speed.
+
+    Args:
+        settings: gains.
+        parameters: planar model of the vehicle, for the shaft speed that a water speed needs.
+        fin_limit: largest effective rudder and stern plane [rad].
+        shaft_limit: largest shaft speed [rad/s].
+        period: time between calls [s].
+    """
+
+    def __init__(
+        self,
+        settings: ControlSettings,
+        parameters: PlanarParameters,
+        fin_limit: float,
+        shaft_limit: float,
+        period: float,
+    ) -> None:
+        self._settings, self._parameters = settings, parameters
+        self._fin_limit, self._shaft_limit, self._period = fin_limit, shaft_limit, period
+        self._pitch_limit = math.radians(settings.pitch_limit_deg)
+        # Tracking indices (acceleration noise x period^2 / measurement noise) of the default sensors.
+        self._heading, self._pitch = _Smoother(0.03, True), _Smoother(0.03, True)
+        self._depth = _Smoother(0.004, False)
+        self._integral = 0.0
+        self._shaft: tuple[float, float] = (math.nan, 0.0)  # the last speed and its shaft speed
+
+    def observe(self, readings: Sequence[Reading]) -> None:
+        """Takes the compass and depth readings among `readings`."""
+        for reading in readings:
+            if reading.sensor == "compass":
+                self._heading.update(reading.stamp, float(reading.value[0]))
+                self._pitch.update(reading.stamp, float(reading.value[1]))
+            elif reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+
+    @property
+    def heading(self) -> float | None:
+        """Smoothed compass heading [rad], None before the first reading."""
+        return self._heading.value
+
+    @property
+    def depth(self) -> float | None:
+        """Smoothed depth [m], None before the first reading."""
+        return self._depth.value
+
+    def command(self, heading: float, depth: float, speed: float) -> Commands:
+        """Actuator commands for a heading [rad], a depth [m] and a speed through the water [m/s], negative astern."""
+        s, shaft_speed = self._settings, self._shaft_speed(speed)
+        if self._heading.value is None or self._pitch.value is None or self._depth.value is None:
+            return Commands(0.0, 0.0, shaft_speed)
+        rudder = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
+        error = depth - self._depth.value
+        wanted = -(s.depth_gain * error + s.depth_integral_gain * self._integral)
+        pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
+        # Positive stern plane dives. The integral stands still while pitch is limited or the vehicle is far off.
+        elevator = s.pitch_gain * (self._pitch.value - pitch) + s.pitch_rate_gain * self._pitch.rate
+        if abs(error) < 1.0 and pitch == wanted:
+            self._integral += error * self._period
+        if speed < 0.0:  # fins act the other way round when the flow comes from astern
+            rudder, elevator = -rudder, -elevator
+        limit = self._fin_limit
+        return Commands(max(-limit, min(limit, rudder)), max(-limit, min(limit, elevator)), shaft_speed)
+
+    def _shaft_speed(self, speed: float) -> float:
+        if speed != self._shaft[0]:
+            ahead = steady_shaft_speed(self._parameters, abs(speed)) if speed else 0.0
+            self._shaft = (speed, math.copysign(min(ahead, self._shaft_limit), speed))
+        return self._shaft[1]

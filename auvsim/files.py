@@ -1,0 +1,21 @@
+"""Files that are whole or absent: written under another name, renamed when done."""
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+
+@contextmanager
+def whole(path: Path) -> Iterator[Path]:
+    """Gives a temporary name beside `path` to write to; renames it on success, removes it on any failure.
+
+    The temporary name keeps the suffix, from which writers of pictures and videos know the format.
+    """
+    path = Path(path)
+    partial = path.with_name(f".{path.stem}.{os.getpid()}.partial{path.suffix}")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)

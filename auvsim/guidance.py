@@ -1,0 +1,279 @@
+"""Docking guidance: search, homing to the gate on the dock's axis, approach along a line, the last metres, go-around, abort.
+
+The law is line of sight with the crab angle taken from the estimated current. Where a cross current would turn the
+heading too far off the dock's axis for the funnel, the approach line is turned instead, so that it still runs through the entrance.
+Coordinates: dock frame, x along the course of a vehicle that enters, y to starboard, origin at the centre of the mouth.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import NamedTuple
+
+from pydantic import Field
+
+from auvsim.frames import wrap
+from auvsim.navigation import Estimate
+from auvsim.sensors.reading import Reading
+from auvsim.settings import Settings
+
+
+class Phase(IntEnum):
+    """Phases of a docking trial, as logged."""
+
+    SEARCH = 0  # no fix yet: hold course and depth
+    HOMING = 1  # to the gate on the dock's axis
+    APPROACH = 2  # along the line to the entrance
+    FINAL = 3  # the last metres
+    DOCKED = 4  # the latch holds
+    GO_AROUND = 5  # back out and round for another attempt
+    ABORTED = 6  # given up
+
+
+class GuidanceSettings(Settings):
+    """How the vehicle comes in."""
+
+    homing_speed: float = Field(1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
+    approach_speed: float = Field(1.0, gt=0, description="speed through the water on the approach [m/s]")
+    gate_distance: float = Field(200.0, gt=0, description="distance of the gate before the entrance [m]")
+    gate_radius: float = Field(20.0, gt=0, description="distance at which the gate counts as reached [m]")
+    retry_distance: float = Field(100.0, gt=0, description="distance of the gate of later attempts [m]")
+    lookahead: float = Field(7.0, gt=0, description="lookahead of the line of sight [m]")
+    heading_limit_deg: float = Field(
+        20.0,
+        gt=0,
+        lt=60,
+        description="largest angle between heading and dock axis before the line is turned instead [deg]",
+    )
+    final_distance: float = Field(20.0, gt=0, description="distance at which the last metres begin [m]")
+    attempts: int = Field(3, ge=1, description="attempts before the vehicle gives up")
+    fix_timeout: float = Field(30.0, gt=0, description="time without a fix after which an approach is broken off [s]")
+    lost_timeout: float = Field(180.0, gt=0, description="time without a fix after which the vehicle gives up [s]")
+
+
+class Command(NamedTuple):
+    """What guidance asks of the autopilot."""
+
+    heading: float  # [rad]
+    depth: float  # [m]
+    speed: float  # through the water [m/s]
+
+
+class Event(NamedTuple):
+    """A change of phase or another decision, for the log."""
+
+    time: float  # [s]
+    kind: str
+    text: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Geometry:
+    """What guidance knows of vehicle and dock."""
+
+    nose: float  # of the vehicle, ahead of its origin [m]
+    mouth_radius: float  # [m]
+    latched: float  # where the latch holds the nose, along the axis from the mouth [m]
+
+
+def approach_course(axis: float, speed: float, current: tuple[float, float], limit: float) -> float:
+    """Course over ground of the approach line [rad]: the dock's axis, or turned so that the heading keeps within `limit` of it.
+
+    Args:
+        axis: course of the dock's axis [rad].
+        speed: through the water [m/s].
+        current: north, east [m/s].
+        limit: largest angle between heading and axis [rad].
+    """
+    heading = heading_for_course(axis, speed, current)
+    offset = wrap(heading - axis)
+    if abs(offset) <= limit:
+        return axis
+    heading = axis + math.copysign(limit, offset)
+    return math.atan2(speed * math.sin(heading) + current[1], speed * math.cos(heading) + current[0])
+
+
+def heading_for_course(course: float, speed: float, current: tuple[float, float]) -> float:
+    """Heading [rad] whose course over ground is `course` [rad] (crab angle); straight across the current where it is too strong."""
+    across = current[1] * math.cos(course) - current[0] * math.sin(course)
+    return course - math.asin(max(-0.95, min(0.95, across / speed)))
+
+
+class Guidance:
+    """The phase machine of a docking trial.
+
+    Args:
+        settings: distances, speeds, limits.
+        geometry: of vehicle and dock.
+    """
+
+    def __init__(self, settings: GuidanceSettings, geometry: Geometry) -> None:
+        self._s, self._g = settings, geometry
+        self._limit = math.radians(settings.heading_limit_deg)
+        self.phase = Phase.SEARCH
+        self.attempt = 1
+        self.events: list[Event] = []
+        self.along = self.cross = math.nan  # of the estimate, dock frame [m]
+        self._axis_sum = (0.0, 0.0)
+        self._depth_sum, self._fixes = 0.0, 0
+        self._last_fix = 0.0
+        self._hold: tuple[float, float] | None = None  # heading and depth held in search
+        self._side = 1.0
+        self._leg = 0
+        self._phase_start = 0.0
+
+    @property
+    def axis(self) -> float:
+        """Course of the dock's axis [rad], the mean of what the dock reported."""
+        return math.atan2(self._axis_sum[1], self._axis_sum[0])
+
+    @property
+    def dock_depth(self) -> float:
+        """Depth of the mouth [m], the mean of what the dock reported."""
+        return self._depth_sum / max(self._fixes, 1)
+
+    @property
+    def finished(self) -> bool:
+        """Whether nothing more will be tried."""
+        return self.phase in (Phase.DOCKED, Phase.ABORTED)
+
+    def observe(self, readings: Sequence[Reading]) -> None:
+        """Takes the dock's reports among `readings`."""
+        for reading in readings:
+            if reading.sensor == "usbl" and all(map(math.isfinite, reading.value.tolist())):
+                heading, depth = float(reading.value[3]), float(reading.value[6])
+                self._axis_sum = (self._axis_sum[0] + math.cos(heading), self._axis_sum[1] + math.sin(heading))
+                self._depth_sum += depth
+                self._fixes += 1
+                self._last_fix = max(self._last_fix, reading.received)
+
+    def update(self, time: float, estimate: Estimate | None, heading: float, depth: float, latched: bool) -> Command:
+        """The command now.
+
+        Args:
+            time: [s].
+            estimate: the last one, or None before there is any.
+            heading: smoothed compass heading [rad].
+            depth: smoothed depth [m].
+            latched: whether the dock's latch holds the vehicle.
+        """
+        if self._hold is None:
+            self._hold = (heading, depth)
+        if latched and self.phase != Phase.DOCKED:
+            self._enter(Phase.DOCKED, time, "latched")
+        if self.phase in (Phase.DOCKED, Phase.ABORTED):
+            return Command(heading, depth, 0.0)
+        silence = time - self._last_fix
+        if silence > self._s.lost_timeout:
+            self._enter(Phase.ABORTED, time, f"no fix for {silence:.0f} s")
+            return Command(heading, depth, 0.0)
+        if estimate is None or not estimate.initialised or not self._fixes:
+            return Command(*self._hold, self._s.approach_speed)
+        if self.phase == Phase.SEARCH:
+            self._enter(Phase.HOMING, time, "first fix")
+        north, east, current = self._nose(time, estimate, heading)
+        if self.phase == Phase.HOMING:
+            return self._home(time, north, east, current)
+        if self.phase == Phase.GO_AROUND:
+            return self._go_around(time, north, east, current)
+        return self._approach(time, estimate, silence, north, east, heading, current)
+
+    def _nose(self, time: float, estimate: Estimate, heading: float) -> tuple[float, float, tuple[float, float]]:
+        """The nose now (north, east) by dead reckoning from the last estimate, and the current; updates along and cross."""
+        u, v, _ = estimate.velocity.tolist()
+        current_north, current_east = estimate.current.tolist()
+        cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
+        north = float(estimate.position[0]) + (u * cos - v * sin + current_north) * dt + self._g.nose * cos
+        east = float(estimate.position[1]) + (u * sin + v * cos + current_east) * dt + self._g.nose * sin
+        axis = self.axis
+        self.along = north * math.cos(axis) + east * math.sin(axis)
+        self.cross = east * math.cos(axis) - north * math.sin(axis)
+        return north, east, (current_north, current_east)
+
+    def _enter(self, phase: Phase, time: float, reason: str) -> None:
+        self.events.append(Event(time, phase.name.lower(), reason))
+        self.phase, self._phase_start = phase, time
+
+    def _to(self, x: float, y: float, north: float, east: float, speed: float, current: tuple[float, float]) -> Command:
+        """Straight to a point of the dock frame, crabbing against the current."""
+        axis = self.axis
+        target_north = x * math.cos(axis) - y * math.sin(axis)
+        target_east = x * math.sin(axis) + y * math.cos(axis)
+        course = math.atan2(target_east - east, target_north - north)
+        return Command(heading_for_course(course, speed, current), self.dock_depth, speed)
+
+    def _home(self, time: float, north: float, east: float, current: tuple[float, float]) -> Command:
+        s = self._s
+        if math.hypot(self.along + s.gate_distance, self.cross) < s.gate_radius:
+            self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
+        return self._to(-s.gate_distance, 0.0, north, east, s.homing_speed, current)
+
+    def _approach(
+        self,
+        time: float,
+        estimate: Estimate,
+        silence: float,
+        north: float,
+        east: float,
+        heading: float,
+        current: tuple[float, float],
+    ) -> Command:
+        s, axis = self._s, self.axis
+        if self.phase == Phase.APPROACH and self.along > -s.final_distance:
+            self._enter(Phase.FINAL, time, f"{-self.along:.0f} m before the entrance, {self.cross:+.2f} m off the axis")
+        reason = self._reason_to_break_off(time, estimate, silence)
+        if reason:
+            return self._break_off(time, reason, north, east, current)
+        line = approach_course(axis, s.approach_speed, current, self._limit)
+        # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
+        error = east * math.cos(line) - north * math.sin(line)
+        course = line - math.atan2(error, s.lookahead)
+        return Command(heading_for_course(course, s.approach_speed, current), self.dock_depth, s.approach_speed)
+
+    def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
+        s, g = self._s, self._g
+        if silence > s.fix_timeout:
+            return f"no fix for {silence:.0f} s"
+        if self.phase != Phase.FINAL:
+            return None
+        c = estimate.covariance
+        mean, half = 0.5 * (c[0, 0] + c[1, 1]), 0.5 * (c[0, 0] - c[1, 1])
+        sigma = math.sqrt(max(0.0, mean + math.hypot(half, c[0, 1])))
+        if sigma > g.mouth_radius:
+            return f"position uncertain by {sigma:.2f} m, mouth radius {g.mouth_radius:.2f} m"
+        if -0.5 < self.along and abs(self.cross) > g.mouth_radius + 0.5:
+            return f"entrance missed by {abs(self.cross):.2f} m"
+        if self.along > g.latched + 1.5:
+            return "entrance passed without capture"
+        patience = 3.0 * (s.final_distance + g.latched) / s.approach_speed
+        if time - self._phase_start > patience:
+            return f"not captured within {patience:.0f} s of the last metres"
+        return None
+
+    def _break_off(self, time: float, reason: str, north: float, east: float, current: tuple[float, float]) -> Command:
+        if self.attempt >= self._s.attempts:
+            self._enter(Phase.ABORTED, time, f"{reason}; attempt {self.attempt} was the last")
+            return Command(self.axis, self.dock_depth, 0.0)
+        self.attempt += 1
+        self._side = math.copysign(1.0, self.cross)
+        self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} follows")
+        # In or before the funnel back out first; beside or behind it, or far off, go round at once.
+        self._leg = 0 if -4.0 < self.along < self._g.latched + 0.5 and abs(self.cross) < 2.0 else 1
+        return self._go_around(time, north, east, current)
+
+    def _go_around(self, time: float, north: float, east: float, current: tuple[float, float]) -> Command:
+        """Back out of the funnel, then sideways clear of the dock, then to a gate abeam of the axis."""
+        s = self._s
+        if self._leg == 0:
+            if time - self._phase_start < 20.0 and self.along > -8.0:
+                return Command(self.axis, self.dock_depth, -0.8 * s.approach_speed)
+            self._leg = 1
+        beside = 40.0 * self._side
+        if self._leg == 1 and (self.along < -40.0 or math.hypot(self.along + 5.0, self.cross - beside) < 15.0):
+            self._leg = 2
+        if self._leg == 1:
+            return self._to(-5.0, beside, north, east, s.homing_speed, current)
+        if math.hypot(self.along + s.retry_distance, self.cross - 0.5 * beside) < s.gate_radius:
+            self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
+        return self._to(-s.retry_distance, 0.5 * beside, north, east, s.homing_speed, current)

@@ -1,0 +1,243 @@
+"""Hands what sensors and modem deliver to an estimator, and its estimate to guidance; any estimator that keeps the contract.
+
+An estimator is made by `factory(parameters, scenario) -> Navigator`: `parameters` is the planar model it may believe (see
+`condense`), `scenario` the full `auvsim.scenario.Scenario`. Named factories are `augmented_ekf` (paper 1, section 12) and `paper`
+(paper 1, sections 6 to 10); any other is given as `package.module:factory`.
+"""
+
+import importlib
+import math
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from pydantic import Field
+
+from auvsim.allocation import Allocation
+from auvsim.errors import InputError, unknown_name
+from auvsim.frames import Array, wrap
+from auvsim.sensors.reading import Reading
+from auvsim.settings import Settings
+from estimators.docking import (
+    PAPER_NOISE,
+    AugmentedFilter,
+    DockingEstimator,
+    DockingNoise,
+    PaperFilter,
+    UsblFix,
+    UsblModel,
+)
+from estimators.planar_model import PlanarParameters
+
+
+class Commands(NamedTuple):
+    """What control asked of the actuators."""
+
+    rudder: float  # effective rudder, positive to starboard [rad]
+    elevator: float  # effective stern plane, positive dives [rad]
+    shaft_speed: float  # [rad/s]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Estimate:
+    """What the vehicle believes at one instant. Position is NED from the surface above the dock's mouth."""
+
+    time: float  # [s]
+    position: Array  # (3,) north, east, depth of the body origin [m]
+    heading: float  # [rad]
+    velocity: Array  # (3,) surge, sway [m/s] and yaw rate [rad/s], through the water
+    current: Array  # (2,) north, east [m/s]
+    covariance: Array  # (8, 8) of north, east, heading, u, v, r, current north, current east; zeros where not estimated
+    initialised: bool  # false until position is known
+    refused: int = 0  # readings refused so far
+    reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
+
+
+class Navigator(Protocol):
+    """The contract of an estimator in a trial."""
+
+    def update(self, time: float, readings: Sequence[Reading], commands: Commands) -> Estimate:
+        """The estimate at `time` [s], given all readings that arrived since the last call, in order of arrival."""
+        ...
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        ...
+
+
+class EstimatorSettings(Settings):
+    """Which estimator, and what it believes of the noises."""
+
+    factory: str = Field("augmented_ekf", description="augmented_ekf, paper, or package.module:factory of your own")
+    compass_deg: float = Field(1.0, gt=0, description="compass noise it believes, each reading [deg]")
+    position_noise: float = Field(4e-4, ge=0, description="process noise of position [m2/s]")
+    heading_noise: float = Field(1e-6, ge=0, description="process noise of heading [rad2/s]")
+    velocity_noise: float = Field(1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_rate_noise: float = Field(1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
+    current_noise: float = Field(
+        1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 for turning currents"
+    )
+    dock_heading_deg: float = Field(0.3, ge=0, description="error of the dock's compass it believes [deg]")
+    model_speed: float = Field(
+        1.0, gt=0, description="speed through the water at which the planar model is condensed [m/s]"
+    )
+
+
+class DockingNavigator:
+    """The docking estimators of `estimators.docking` behind the contract.
+
+    Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the gauge's, smoothed.
+    """
+
+    def __init__(self, estimator: DockingEstimator, allocation: Allocation, compass_rate: float) -> None:
+        self._estimator, self._allocation = estimator, allocation
+        self._compass_period = 1.0 / compass_rate
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._estimator.reset()
+        self._depth: float | None = None
+        self._depth_rate = 0.0
+        self._depth_stamp = 0.0
+        self._yaw_rate = 0.0
+
+    def update(self, time: float, readings: Sequence[Reading], commands: Commands) -> Estimate:
+        """The estimate at `time`, see `Navigator.update`."""
+        headings, stamps, drives, fixes = [], [], [], []
+        for reading in readings:
+            if reading.sensor == "compass":
+                headings.append(float(reading.value[0]))
+                stamps.append(reading.stamp)
+            elif reading.sensor == "feedback":
+                drives.append(reading.value)
+            elif reading.sensor == "depth":
+                self._smooth_depth(reading.stamp, float(reading.value[0]))
+            elif reading.sensor == "usbl":
+                x, y, z, heading, pitch, roll, _ = reading.value.tolist()
+                fixes.append(
+                    UsblFix(
+                        stamp=reading.stamp,
+                        received=reading.received,
+                        position=(x, y, z),
+                        heading=heading,
+                        pitch=pitch,
+                        roll=roll,
+                        sequence=reading.sequence,
+                    )  # fmt: skip
+                )
+        rudder, shaft_speed = commands.rudder, commands.shaft_speed
+        if drives:
+            mean = sum(drives) / len(drives)
+            rudder, shaft_speed = self._allocation.effective(mean[:-1])[0], float(mean[-1])
+        result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
+        mean = result.mean
+        self._yaw_rate = float(mean[5])
+        depth = 0.0 if self._depth is None else self._depth + self._depth_rate * (time - self._depth_stamp)
+        return Estimate(
+            time=time,
+            position=np.array([mean[0], mean[1], depth]),
+            heading=float(mean[2]),
+            velocity=mean[3:6],
+            current=mean[6:8],
+            covariance=result.covariance,
+            initialised=result.initialised,
+            refused=sum(result.refused.values()),
+            reasons=result.refused,
+        )
+
+    def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:
+        if not headings:
+            return None
+        first = headings[0]
+        offsets = [wrap(h - first) + self._yaw_rate * (time - t) for h, t in zip(headings, stamps, strict=True)]
+        return wrap(first + sum(offsets) / len(offsets))
+
+    def _smooth_depth(self, stamp: float, depth: float) -> None:
+        """Steady-state alpha-beta filter of the gauge (Bar-Shalom 2001, sec. 6.5), gains for 0.05 m and about 0.02 m/s2."""
+        if self._depth is None:
+            self._depth, self._depth_stamp = depth, stamp
+            return
+        dt = stamp - self._depth_stamp
+        predicted = self._depth + self._depth_rate * dt
+        innovation = depth - predicted
+        self._depth, self._depth_stamp = predicted + 0.09 * innovation, stamp
+        if dt > 0.0:
+            self._depth_rate += 0.0042 * innovation / dt
+
+
+def _docking(
+    parameters: PlanarParameters, scenario: Any, kind: Callable[..., Any], base: DockingNoise
+) -> DockingNavigator:
+    """A docking filter for a scenario: what it believes comes from the estimator's settings, never from the sensors' draws."""
+    from auvsim import library
+
+    settings: EstimatorSettings = scenario.estimator
+    usbl = scenario.sensors.usbl
+    step = 1.0 / scenario.rates.filter
+    readings = max(1.0, scenario.sensors.compass.rate * step)
+    noise = replace(base, compass=math.radians(settings.compass_deg) / math.sqrt(readings))
+    model = UsblModel(transceiver=usbl.transceiver, dock_heading=math.radians(settings.dock_heading_deg))
+    filter_ = kind(parameters, noise, transponder=usbl.transponder[:2])
+    estimator = DockingEstimator(filter_, model, step=step)
+    return DockingNavigator(
+        estimator, library.vehicle(scenario.vehicle.model).allocation, scenario.sensors.compass.rate
+    )
+
+
+def augmented_ekf(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The augmented extended Kalman filter in the delay buffer (paper 1, sections 8 and 12)."""
+    s: EstimatorSettings = scenario.estimator
+    noise = DockingNoise(
+        position=s.position_noise, heading=s.heading_noise, surge=s.velocity_noise, sway=s.velocity_noise,
+        yaw_rate=s.yaw_rate_noise, current=s.current_noise,
+    )  # fmt: skip
+    return _docking(parameters, scenario, AugmentedFilter, noise)
+
+
+def paper(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """Paper 1's improved filter, with the noises it recommends."""
+    return _docking(parameters, scenario, PaperFilter, PAPER_NOISE)
+
+
+FACTORIES: dict[str, Callable[[PlanarParameters, Any], Navigator]] = {"augmented_ekf": augmented_ekf, "paper": paper}
+
+
+def find_factory(name: str) -> Callable[[PlanarParameters, Any], Navigator]:
+    """The estimator factory of a name or of `package.module:factory` (also found in the working folder).
+
+    Raises:
+        InputError: there is none.
+    """
+    if name in FACTORIES:
+        return FACTORIES[name]
+    if ":" not in name:
+        raise unknown_name("estimator", name, [*FACTORIES, "package.module:factory of your own"])
+    module, _, attribute = name.partition(":")
+    folder = str(Path.cwd())
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        found = getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # a user's module may fail in any way while it is imported
+        raise InputError(f"estimator '{name}': {type(error).__name__}: {error}") from None
+    if not callable(found):
+        raise InputError(f"estimator '{name}' is not callable; it must be factory(parameters, scenario) -> Navigator")
+    return found
+
+
+def build(name: str, parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """Makes the estimator of a scenario.
+
+    Raises:
+        InputError: there is no such factory, or it does not return a Navigator.
+    """
+    navigator = find_factory(name)(parameters, scenario)
+    for method in ("update", "reset"):
+        if not callable(getattr(navigator, method, None)):
+            raise InputError(f"estimator '{name}' made a {type(navigator).__name__} without {method}(); see Navigator")
+    return navigator

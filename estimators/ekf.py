@@ -1,0 +1,80 @@
+"""The extended Kalman filter without state of its own: belief in, belief out."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators import loops
+from estimators.consistency import chi_square
+from estimators.errors import NotFiniteError, NotPositiveDefiniteError
+from estimators.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Innovation:
+    """What a measurement said that the belief did not."""
+
+    residual: Array  # (m,)
+    covariance: Array  # (m, m) of the residual, S = H P H' + R
+    gain: Array  # (n, m) Kalman gain
+    nis: float  # residual' S^-1 residual
+    accepted: bool  # False: outside the gate, the belief is as it was
+
+
+def predict(belief: Gaussian, process: ProcessModel, u: Sequence[float], dt: float) -> Gaussian:
+    """The belief after `dt` [s] with the input `u` held: f(x), F P F' + Q.
+
+    A process with a `propagate(mean, covariance, u, dt) -> (mean, covariance, ...)` of its own is predicted with that.
+
+    Raises:
+        NotFiniteError: The prediction is not finite.
+    """
+    propagate = getattr(process, "propagate", None)
+    if propagate is not None:
+        mean, covariance, *_ = propagate(belief.mean, belief.covariance, u, dt)
+        return Gaussian(mean=mean, covariance=covariance)
+    x = belief.mean
+    F = process.jacobian(x, u, dt)
+    P = F @ belief.covariance @ F.T + process.covariance(x, u, dt)
+    mean = process.evaluate(x, u, dt)
+    if not (np.isfinite(mean).all() and np.isfinite(P).all()):
+        raise NotFiniteError(f"prediction over {dt:g} s from {x} with input {u} is not finite")
+    return Gaussian(mean=mean, covariance=0.5 * (P + P.T))
+
+
+def correct(
+    belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None
+) -> tuple[Gaussian, Innovation]:
+    """The belief after a measurement, in Joseph's form.
+
+    Args:
+        belief: State before the measurement.
+        measurement: Value (m,) and covariance (m, m).
+        model: What the sensor shows of the state.
+        gate: Probability with which a measurement that fits the models is accepted, 0.999 say; None accepts all.
+
+    Raises:
+        NotPositiveDefiniteError: The innovation's covariance is not positive definite.
+        NotFiniteError: The correction is not finite.
+    """
+    x = belief.mean
+    residual = model.residual(measurement.value, model.evaluate(x))
+    limit = math.inf if gate is None else chi_square(gate, residual.size)
+    return correct_linear(belief, model.jacobian(x), residual, model.covariance(x, measurement), limit)
+
+
+def correct_linear(
+    belief: Gaussian, H: Array, residual: Array, R: Array, limit: float = math.inf
+) -> tuple[Gaussian, Innovation]:
+    """As `correct`, with H (m, n), residual (m,) and R (m, m) at hand; `limit` is the largest accepted NIS."""
+    mean, covariance, gain, S, nis, status = loops.correct(belief.mean, belief.covariance, H, residual, R, limit)
+    if status == loops.NOT_POSITIVE_DEFINITE:
+        raise NotPositiveDefiniteError(
+            f"innovation covariance {S.tolist()} of residual {residual} is not positive definite"
+        )
+    if status == loops.NOT_FINITE:
+        raise NotFiniteError(f"correction of {belief.mean} by the residual {residual} is not finite")
+    innovation = Innovation(residual=residual, covariance=S, gain=gain, nis=nis, accepted=status == loops.OK)
+    return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation

@@ -1,0 +1,66 @@
+"""What filters pass round: beliefs, measurements, and the two kinds of model a user may bring."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Gaussian:
+    """A belief: mean and covariance of a state."""
+
+    mean: Array  # (n,)
+    covariance: Array  # (n, n) symmetric, positive semi-definite
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Measurement:
+    """A measured value with the time it was true and the time it arrived."""
+
+    kind: str  # names the sensor, and with it the measurement model: "compass", "usbl"
+    value: Array  # (m,)
+    covariance: Array  # (m, m) positive definite
+    stamp: float  # when it was true [s]
+    received: float  # when it arrived [s]
+    sequence: int | None = None  # counts one sensor's measurements; None if the sensor does not count
+
+
+class ProcessModel(Protocol):
+    """How a state moves on: x' = f(x, u, dt) + noise of covariance Q(x, u, dt)."""
+
+    def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
+        """State (n,) after `dt` [s] with the input `u` held."""
+        ...
+
+    def jacobian(self, x: Array, u: Sequence[float], dt: float) -> Array:
+        """Derivative of `evaluate` with respect to `x`, (n, n)."""
+        ...
+
+    def covariance(self, x: Array, u: Sequence[float], dt: float) -> Array:
+        """Covariance of the noise gathered over `dt`, (n, n)."""
+        ...
+
+
+class MeasurementModel(Protocol):
+    """What a sensor shows of a state: y = g(x) + noise of covariance R(x, measurement)."""
+
+    def evaluate(self, x: Array) -> Array:
+        """Value (m,) expected in the state `x` (n,)."""
+        ...
+
+    def jacobian(self, x: Array) -> Array:
+        """Derivative of `evaluate` with respect to `x`, (m, n)."""
+        ...
+
+    def covariance(self, x: Array, measurement: Measurement) -> Array:
+        """Covariance of the measurement's noise, (m, m); most models return `measurement.covariance`."""
+        ...
+
+    def residual(self, value: Array, expected: Array) -> Array:
+        """`value - expected` (m,), with angles wrapped to (-pi, pi]."""
+        ...
