@@ -29,3 +29,10 @@ def to_body(quaternion: Array, vector: Array) -> Array:
     w, axis = quaternion[:, :1], -quaternion[:, 1:]  # the conjugate turns back
     twice = 2.0 * np.cross(axis, vector)
     return vector + w * twice + np.cross(axis, twice)
+
+
+def funnel_outline(log: TrialLog) -> tuple[Array, Array]:
+    """Port and starboard outline (3, 2) of the funnel and throat: along and cross track [m]."""
+    mouth, throat, cone = log.number("mouth_radius"), log.number("throat_radius"), log.number("cone_length")
+    starboard = np.array([[0.0, mouth], [cone, throat], [cone + log.number("throat_length"), throat]])
+    return starboard * np.array([1.0, -1.0]), starboard

@@ -13,10 +13,11 @@ Array = NDArray[np.float64]
 
 FLIP = np.array([1.0, -1.0, -1.0])  # diagonal of the half turn about x
 FLIP6 = np.concatenate([FLIP, FLIP])  # the same for [linear, angular] pairs
+_FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
 
 
 def flip(vector: Array) -> Array:
-    """Turns vectors (..., 3) from NED to MuJoCo's world, or back; also body forward-starboard-down to or from port-up."""
+    """Turns vectors (..., 3) between NED and MuJoCo's world; also between the two kinds of body axes."""
     return np.asarray(vector, dtype=float) * FLIP
 
 
@@ -29,7 +30,7 @@ def flip_matrix(matrix: Array) -> Array:
 
 def flip_quaternion(quaternion: Array) -> Array:
     """Turns attitude quaternions (..., 4) wxyz between body-to-NED and MuJoCo's body-to-world."""
-    return np.asarray(quaternion, dtype=float) * np.array([1.0, 1.0, -1.0, -1.0])
+    return np.asarray(quaternion, dtype=float) * _FLIP_QUATERNION
 
 
 def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Array:

@@ -13,10 +13,11 @@ from numpy.typing import NDArray
 
 from auvsim import netcdf
 from auvsim.errors import InputError
+from auvsim.guidance import Phase
 
 FORMAT_VERSION = 1
 STATUSES = ("complete", "diverged", "interrupted")
-PHASES = ("search", "homing", "approach", "final", "docked", "go_around", "aborted")  # flag values 0, 1, ...
+PHASES = tuple(phase.name.lower() for phase in Phase)  # flag values 0, 1, ...
 
 Groups = dict[str, dict[str, NDArray[Any]]]
 

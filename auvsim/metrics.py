@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from statistics import NormalDist
 from typing import Any
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from auvsim.dock_frame import in_dock_frame, nose_position, to_body
 from auvsim.errors import InputError
 from auvsim.frames import Array, wrap
+from auvsim.guidance import Phase
 from auvsim.log import PHASES, WALL_TIME, TrialLog
 from estimators.consistency import chi_square, interval, normalised_square
 from estimators.docking import horizontal_rotation
@@ -77,7 +79,7 @@ class Summary:
     crossings: tuple[Crossing, ...]
     contact_impulse: float  # [N s]
     peak_contact_force: float  # [N]
-    estimate: dict[str, EstimateQuality]  # "all" and each phase that has estimates, once initialised
+    estimate: dict[str, EstimateQuality]  # "all" before docking, and each phase that has estimates; once initialised
     fixes_sent: int
     fixes_lost: int
     fixes_outliers: int  # that arrived
@@ -173,8 +175,11 @@ def estimate_errors(log: TrialLog) -> EstimateErrors:
 
 
 def estimate_quality(errors: EstimateErrors) -> dict[str, EstimateQuality]:
-    """Root-mean-square errors and consistency, over all initialised estimates and phase by phase."""
-    parts = {"all": errors.initialised}
+    """Root-mean-square errors and consistency, phase by phase and over all initialised estimates before docking.
+
+    Once the latch holds it, the vehicle no longer moves as any model of free motion says; "all" leaves that out.
+    """
+    parts = {"all": errors.initialised & (errors.phase != Phase.DOCKED)}
     parts |= {name: errors.initialised & (errors.phase == index) for index, name in enumerate(PHASES)}
     limit = chi_square(0.95, 2)
     qualities = {}
@@ -226,6 +231,16 @@ def phase_at(log: TrialLog, times: Array) -> NDArray[np.int64]:
     return _latest(log, "phase", times, -1)
 
 
+def phase_stretches(phases: NDArray[Any]) -> Iterator[tuple[int, int, int]]:
+    """Phase, first index and index of the next stretch's first (the last index at the end) of each run of phases."""
+    if not len(phases):
+        return
+    starts = np.concatenate([[0], np.flatnonzero(np.diff(phases)) + 1, [len(phases) - 1]])
+    for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
+        if stop > start:
+            yield int(phases[start]), start, stop
+
+
 def _latest(log: TrialLog, name: str, times: Array, before: int) -> NDArray[np.int64]:
     """The last value of a guidance variable at or before each time."""
     values = np.concatenate([[before], log["guidance"][name].astype(int)])
@@ -235,7 +250,7 @@ def _latest(log: TrialLog, name: str, times: Array, before: int) -> NDArray[np.i
 def _docking_time(log: TrialLog) -> float | None:
     docked = log["event"]["time"][log["event"]["kind"] == "docked"]
     if not len(docked):
-        docked = log["guidance"]["time"][log["guidance"]["phase"] == PHASES.index("docked")]
+        docked = log["guidance"]["time"][log["guidance"]["phase"] == Phase.DOCKED]
     return float(docked[0]) if len(docked) else None
 
 
@@ -247,7 +262,7 @@ def _failure(log: TrialLog) -> tuple[str, str | None]:
         return status, next((text for kind, text in reversed(events) if kind == status), None)
     if events:
         return events[-1]
-    aborted = log["guidance"]["phase"][-1:].tolist() == [PHASES.index("aborted")]
+    aborted = log["guidance"]["phase"][-1:].tolist() == [Phase.ABORTED]
     return ("aborted" if aborted else "timeout"), None
 
 

@@ -90,7 +90,8 @@ def _save_values(group: h5py.Group, name: str, values: NDArray[Any]) -> h5py.Dat
     options: dict[str, Any] = {"shape": shape, "maxshape": limits, "chunks": chunks, "track_order": True}
     if values.dtype == object:
         return group.create_dataset(name, data=values, dtype=h5py.string_dtype(), **options)
-    options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
+    if values.ndim == 1:  # times, counts, held commands; of vectors and covariances gzip only takes 15 %, slowly
+        options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
     if values.dtype != bool:
         return group.create_dataset(name, data=values, **options)
     dataset = group.create_dataset(name, data=values.astype(np.int8), **options)

@@ -5,7 +5,6 @@ Figures are made without pyplot, so nothing global (backend, style, open figures
 
 import math
 import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,22 +14,40 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
 
-from auvsim.dock_frame import in_dock_frame, nose_position
+from auvsim.dock_frame import funnel_outline, in_dock_frame, nose_position
+from auvsim.drawing import (
+    ARRIVED,
+    BAND,
+    BAND_EDGE,
+    DOCK,
+    OUTLIER,
+    WATER,
+    dress,
+    event_ticks,
+    legend,
+    phase_colour,
+    phase_line,
+    phase_name,
+    shade_phases,
+)
 from auvsim.errors import InputError
 from auvsim.files import whole
 from auvsim.frames import Array
-from auvsim.log import PHASES, TrialLog
-from auvsim.metrics import NEES_INTERVAL, EstimateErrors, Summary, estimate_errors, fixes, phase_at, summarise
+from auvsim.guidance import Phase
+from auvsim.log import TrialLog
+from auvsim.metrics import (
+    NEES_INTERVAL,
+    EstimateErrors,
+    Summary,
+    estimate_errors,
+    fixes,
+    phase_at,
+    summarise,
+)
 
 SIZE = (14.0, 9.0)  # [in]
 DPI = 110
 ZOOM = 30.0  # length of the last part in the dock's frame [m]
-PHASE_COLOURS = ("#7f7f7f", "#1f77b4", "#17a2a2", "#2ca02c", "#9467bd", "#ff7f0e", "#d62728")  # as in PHASES
-NO_PHASE = "#444444"
-DOCK = "#8c4a1f"
-WATER = "#0055aa"
-OUTLIER = "#d62728"
-BAND, BAND_EDGE = (0.30, 0.45, 0.69, 0.22), "#4c72b0"
 ESTIMATE: dict[str, Any] = {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.0, "label": "estimate"}
 
 
@@ -63,12 +80,14 @@ def _save(figure: Figure, path: str | os.PathLike[str]) -> None:
 def track_figure(log: TrialLog) -> Figure:
     """The figure that `track` writes."""
     figure = Figure(figsize=SIZE, layout="constrained")
-    grid = figure.add_gridspec(2, 2, width_ratios=(1.3, 1.0))
-    plan = figure.add_subplot(grid[:, 0])
-    _plan(plan, log)
-    _zoom(figure.add_subplot(grid[0, 1]), log)
+    side = _side(log)
+    upper = 11.0 * side / ZOOM + 0.9  # so that the zoom, drawn to scale, fills its cell [in]
+    grid = figure.add_gridspec(2, 2, width_ratios=(1.3, 1.0), height_ratios=(upper, 8.0 - upper))
+    _plan(figure.add_subplot(grid[:, 0]), log)
+    _zoom(figure.add_subplot(grid[0, 1]), log, side)
     _depth(figure.add_subplot(grid[1, 1]), log)
-    figure.legend(*plan.get_legend_handles_labels(), loc="outside lower center", ncols=14, fontsize=9.5, frameon=False)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    legend(figure, dict(zip(labels, handles, strict=True)))
     figure.suptitle(_headline(log, summarise(log)), fontsize=13)
     return figure
 
@@ -83,19 +102,20 @@ def _headline(log: TrialLog, summary: Summary) -> str:
 def _plan(axes: Axes, log: TrialLog) -> None:
     position, estimate, usbl, place = log["truth"]["position"], log["estimate"], log["usbl"], fixes(log)
     shown = np.concatenate([position[:, 1::-1], place[~usbl["lost"] & ~usbl["outlier"], ::-1], np.zeros((1, 2))])
-    low, high = np.nanmin(shown, axis=0), np.nanmax(shown, axis=0)
+    shown = shown[np.isfinite(shown).all(axis=1)]
+    low, high = shown.min(axis=0), shown.max(axis=0)
     centre, half = (low + high) / 2.0, max(0.56 * float((high - low).max()), 5.0)
     heading = log.number("dock_heading")
     course = np.array([math.sin(heading), math.cos(heading)])  # east, north
     axes.plot(*np.outer(course, (0.0, -4.0 * half)), ":", color=DOCK, lw=1.1, label="dock axis")
-    walls = [wall @ np.array([course, [course[1], -course[0]]]) for wall in _walls(log)]
+    walls = [wall @ np.array([course, [course[1], -course[0]]]) for wall in funnel_outline(log)]
     for wall in walls:
         axes.plot(*wall.T, color=DOCK, lw=2.0, zorder=5)
     # To scale it can be too small to see: a symbol of the same shape, mouth to the approaching vehicle.
     symbol = np.concatenate([walls[0], walls[1][::-1]])
     axes.plot(0.0, 0.0, marker=symbol, mfc="#f0d9c4", mec=DOCK, ms=26, ls="", label="dock", zorder=2)
-    _coloured(axes, log, position[:, 1], position[:, 0])
-    axes.plot(*estimate["position"][estimate["initialised"], 1::-1].T, **ESTIMATE)
+    phase_line(axes, log, position[:, 1], position[:, 0])
+    axes.plot(*estimate["position"][_believable(log), 1::-1].T, **ESTIMATE)
     axes.plot(*place[~usbl["lost"] & ~usbl["outlier"], ::-1].T, ".", color="#555555", ms=5, label="USBL fix")
     axes.plot(*place[~usbl["lost"] & usbl["outlier"], ::-1].T, "x", color=OUTLIER, ms=6, label="outlier")
     axes.plot(*position[:1, 1::-1].T, "o", color="white", mec="black", ms=9, label="start", zorder=6)
@@ -103,7 +123,7 @@ def _plan(axes: Axes, log: TrialLog) -> None:
     axes.set(xlim=(centre[0] - half, centre[0] + half), ylim=(centre[1] - half, centre[1] + half))
     axes.set_aspect("equal", adjustable="box")
     _current(axes, log, (shown - centre) / half)
-    _dress(axes, "Plan view", "east [m]", "north [m]")
+    dress(axes, "Plan view", "east [m]", "north [m]")
 
 
 def _current(axes: Axes, log: TrialLog, shown: Array) -> None:
@@ -120,48 +140,55 @@ def _current(axes: Axes, log: TrialLog, shown: Array) -> None:
         tip = 0.8 * np.array([east, north]) / speed
         arrow = {"arrowstyle": "-|>", "color": WATER, "lw": 2.2, "mutation_scale": 16}
         inset.annotate("", xy=tuple(tip), xytext=tuple(-tip), arrowprops=arrow)
-    course = f" to {math.degrees(math.atan2(east, north)) % 360.0:.0f}°" if speed > 0.0 else ""
-    inset.set_title(f"current {speed:.2f} m/s{course}", fontsize=9.5, color=WATER, pad=3)
+    course = math.degrees(math.atan2(east, north)) % 360.0
+    text = f"current {speed:.2f} m/s to {course:.0f}°" if speed > 0.0 else "no current"
+    inset.set_title(text, fontsize=9.5, color=WATER, pad=3)
 
 
-def _zoom(axes: Axes, log: TrialLog) -> None:
+def _believable(log: TrialLog) -> NDArray[np.bool_]:
+    """Which estimates to draw: those between the first fix and docking, when the motion is that of a free vehicle."""
+    estimate = log["estimate"]
+    return estimate["initialised"] & (phase_at(log, estimate["time"]) != Phase.DOCKED)
+
+
+def _side(log: TrialLog) -> float:
+    """How far to both sides the zoom reaches [m]: as far as the nose came while near."""
+    along, cross, _ = in_dock_frame(log, nose_position(log)).T
+    return min(max(1.3 * float(np.abs(cross[np.abs(along + ZOOM / 2.0) < ZOOM / 2.0]).max(initial=0.0)), 4.0), 9.0)
+
+
+def _zoom(axes: Axes, log: TrialLog, side: float) -> None:
     """The nose in the dock's frame from above: entering to the right, starboard below."""
     nose, estimate = in_dock_frame(log, nose_position(log)), log["estimate"]
     heading = estimate["heading"]
     ahead = log.number("vehicle_nose") * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=-1)
-    believed = in_dock_frame(log, estimate["position"] + ahead)[estimate["initialised"]]
-    for wall in _walls(log):
+    believed = in_dock_frame(log, estimate["position"] + ahead)[_believable(log)]
+    for wall in funnel_outline(log):
         axes.plot(*wall.T, color=DOCK, lw=2.5, zorder=5)
     axes.axhline(0.0, ls=":", color=DOCK, lw=1.1)
     axes.axvline(0.0, ls=":", color="#888888", lw=1.0)
-    _coloured(axes, log, nose[:, 0], nose[:, 1], width=1.8)
+    phase_line(axes, log, nose[:, 0], nose[:, 1], width=1.8)
     axes.plot(believed[:, 0], believed[:, 1], marker=".", ms=4, **ESTIMATE)
-    axes.set(xlim=(-ZOOM, 4.0), ylim=(9.0, -9.0))
+    axes.set(xlim=(-ZOOM, 4.0), ylim=(side, -side))
     axes.set_aspect("equal", adjustable="box")
-    _dress(axes, f"Nose in the dock's frame, last {ZOOM:.0f} m", "along track [m]", "cross track, to starboard [m]")
-
-
-def _walls(log: TrialLog) -> tuple[Array, Array]:
-    """Port and starboard outline (3, 2) of the funnel and throat: along and cross track [m]."""
-    mouth, throat, cone = log.number("mouth_radius"), log.number("throat_radius"), log.number("cone_length")
-    starboard = np.array([[0.0, mouth], [cone, throat], [cone + log.number("throat_length"), throat]])
-    return starboard * np.array([1.0, -1.0]), starboard
+    dress(axes, f"The nose from above, last {ZOOM:.0f} m, starboard below", "along track [m]", "cross track [m]")
 
 
 def _depth(axes: Axes, log: TrialLog) -> None:
     truth, estimate, guidance = log["truth"], log["estimate"], log["guidance"]
-    seen = estimate["initialised"]
+    seen = _believable(log)
     axes.plot(guidance["time"], guidance["depth_command"], color="#999999", lw=2.5, label="command")
     axes.axhline(log.number("dock_depth"), ls=":", color=DOCK, lw=1.3, label="dock")
-    _coloured(axes, log, truth["time"], truth["position"][:, 2], labelled=False)
+    phase_line(axes, log, truth["time"], truth["position"][:, 2])
     axes.plot(estimate["time"][seen], estimate["position"][seen, 2], **ESTIMATE)
-    depths = np.concatenate([truth["position"][:, 2], [log.number("dock_depth")]])
-    low, high = float(np.nanmin(depths)), float(np.nanmax(depths))
+    depths = np.append(truth["position"][:, 2], log.number("dock_depth"))
+    depths = depths[np.isfinite(depths)]
+    low, high = float(depths.min()), float(depths.max())
     margin = 0.1 * (high - low) + 0.2
     axes.set(ylim=(high + margin, low - margin))
-    axes.margins(x=0.01)
-    _dress(axes, "Depth (truth in the colours of the phases)", "time [s]", "depth [m]")
-    axes.legend(loc="best", fontsize=9.5)
+    dress(axes, "Depth (truth in the colours of the phases)", "time [s]", "depth [m]")
+    handles = [line for line in axes.get_lines() if line.get_label() in ("command", "dock", "estimate")]
+    axes.legend(handles=handles, loc="best", fontsize=9.5)
 
 
 def estimates_figure(log: TrialLog) -> Figure:
@@ -177,16 +204,14 @@ def estimates_figure(log: TrialLog) -> Figure:
         ("Current north", "error [m/s]", errors.current[:, 0], errors.sigma[:, 6]),
         ("Current east", "error [m/s]", errors.current[:, 1], errors.sigma[:, 7]),
     )
-    first: Axes | None = None
     for index, (title, unit, error, sigma) in enumerate(panels):
-        axes = figure.add_subplot(grid[index // 2, index % 2], sharex=first)
-        first = first or axes
+        axes = figure.add_subplot(grid[index // 2, index % 2], sharex=figure.axes[0] if index else None)
         _error(axes, errors, error, sigma)
-        _shade(axes, log)
-        _ticks(axes, log)
-        _dress(axes, title, "", unit)
+        shade_phases(axes, log)
+        event_ticks(axes, log)
+        dress(axes, title, "", unit)
         axes.tick_params(labelbottom=index >= len(panels) - 2)
-    axes = figure.add_subplot(grid[3, :], sharex=first)
+    axes = figure.add_subplot(grid[3, :], sharex=figure.axes[0])
     _nees(axes, log, errors)
     figure.suptitle(_consistency(log, summarise(log)), fontsize=13)
     _estimates_legend(figure, log)
@@ -212,10 +237,11 @@ def _error(axes: Axes, errors: EstimateErrors, error: Array, sigma: Array) -> No
     axes.fill_between(time, -band, band, facecolor=BAND, edgecolor=BAND_EDGE, lw=0.9)
     axes.plot(time, error[seen], color="#1a1a1a", lw=1.1)
     axes.axhline(0.0, color="#888888", lw=0.7)
-    if seen.any():
-        # A first, uninformed band must not flatten the rest.
-        limit = max(float(np.percentile(np.abs(error[seen]), 99.0)), float(np.percentile(band, 95.0)), 1e-6)
-        axes.set(ylim=(-1.25 * limit, 1.25 * limit))
+    free = seen & (errors.phase != Phase.DOCKED)
+    if free.any():
+        # Neither the first, uninformed band nor what follows the latch may flatten the rest.
+        limit = max(float(np.abs(error[free]).max()), float(np.percentile(2.0 * sigma[free], 90.0)), 1e-6)
+        axes.set(ylim=(-1.2 * limit, 1.2 * limit))
 
 
 def _nees(axes: Axes, log: TrialLog, errors: EstimateErrors) -> None:
@@ -224,72 +250,16 @@ def _nees(axes: Axes, log: TrialLog, errors: EstimateErrors) -> None:
     axes.axhline(2.0, color="#888888", lw=0.9, ls="--")
     axes.plot(errors.time[known], errors.nees[known], color="#1a1a1a", lw=1.1)
     axes.set(yscale="log", ylim=(0.01, max(30.0, 2.0 * float(errors.nees[known].max(initial=1.0)))))
-    _shade(axes, log)
-    _ticks(axes, log)
+    shade_phases(axes, log)
+    event_ticks(axes, log)
     title = "NEES of the horizontal position: 95 % interval and mean (dashed) of 2 degrees of freedom"
-    _dress(axes, title, "time [s]", "NEES [-]")
-
-
-def _ticks(axes: Axes, log: TrialLog) -> None:
-    """Ticks along the lower edge: fixes when they arrived, and when the estimator refused readings."""
-    usbl, estimate = log["usbl"], log["estimate"]
-    arrived = usbl["received"][~usbl["lost"]]
-    refused = estimate["time"][1:][np.diff(estimate["refused"]) > 0]
-    for times, colour, width in ((arrived, "#2c7a2c", 1.0), (refused, OUTLIER, 2.2)):
-        axes.vlines(times, 0.0, 0.07, color=colour, lw=width, transform=axes.get_xaxis_transform(), zorder=4)
-
-
-def _shade(axes: Axes, log: TrialLog) -> None:
-    """Colours the background by phase, over the time that the guidance logged."""
-    time = log["guidance"]["time"]
-    for phase, start, stop in _stretches(log["guidance"]["phase"].astype(int)):
-        axes.axvspan(time[start], time[stop], color=_colour(phase), alpha=0.12, lw=0.0, zorder=0)
-    if len(time):
-        axes.set(xlim=(time[0], time[-1]))
+    dress(axes, title, "time [s]", "NEES [-]")
 
 
 def _estimates_legend(figure: Figure, log: TrialLog) -> None:
-    handles: list[Any] = figure.axes[0].get_lines()[:1]
-    labels = ["error"]
-    handles.append(Patch(facecolor=BAND, edgecolor=BAND_EDGE))
-    labels.append("±2σ claimed, 95 % interval")
-    for colour, label in (("#2c7a2c", "fix arrived"), (OUTLIER, "reading refused")):
-        handles.append(Patch(color=colour))
-        labels.append(label)
+    entries: dict[str, Any] = {"error": figure.axes[0].get_lines()[0]}
+    entries["±2σ claimed, 95 % interval"] = Patch(facecolor=BAND, edgecolor=BAND_EDGE)
+    entries |= {"fix arrived": Patch(color=ARRIVED), "reading refused": Patch(color=OUTLIER)}
     for phase in sorted(set(log["guidance"]["phase"].tolist())):
-        handles.append(Patch(color=_colour(phase), alpha=0.25))
-        labels.append(PHASES[phase].replace("_", " "))
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), fontsize=9.5, frameon=False)
-
-
-def _coloured(axes: Axes, log: TrialLog, x: Array, y: Array, *, labelled: bool = True, width: float = 2.2) -> None:
-    """A line of the truth in the colours of the phases."""
-    named: set[int] = set()
-    for phase, start, stop in _stretches(phase_at(log, log["truth"]["time"])):
-        label = (PHASES[phase].replace("_", " ") if phase >= 0 else "truth") if phase not in named else None
-        part = slice(start, stop + 1)  # up to the next stretch, so that no gap shows
-        axes.plot(x[part], y[part], color=_colour(phase), lw=width, label=label if labelled else None)
-        named.add(phase)
-
-
-def _stretches(phases: NDArray[Any]) -> Iterator[tuple[int, int, int]]:
-    """Phase, first index and index of the next stretch's first (the last index at the end) of each run of phases."""
-    if not len(phases):
-        return
-    starts = np.concatenate([[0], np.flatnonzero(np.diff(phases)) + 1, [len(phases) - 1]])
-    for start, stop in zip(starts[:-1].tolist(), starts[1:].tolist(), strict=True):
-        if stop > start:
-            yield int(phases[start]), start, stop
-
-
-def _colour(phase: int) -> str:
-    return PHASE_COLOURS[phase] if phase >= 0 else NO_PHASE
-
-
-def _dress(axes: Axes, title: str, x: str, y: str) -> None:
-    axes.set_title(title, fontsize=11.5)
-    axes.set_xlabel(x, fontsize=10.5)
-    axes.set_ylabel(y, fontsize=10.5)
-    axes.tick_params(labelsize=9.5)
-    axes.grid(color="#cccccc", lw=0.6)
-    axes.set_axisbelow(True)
+        entries[phase_name(phase)] = Patch(color=phase_colour(phase), alpha=0.25)
+    legend(figure, entries)

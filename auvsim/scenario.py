@@ -22,7 +22,7 @@ from auvsim.world import WorldSettings
 
 
 class Rates(Settings):
-    """Rates of the parts of the loop; each divides the physics rate, and the filter's also the control rate."""
+    """Rates of the parts of the loop; control divides the physics rate, the others divide control."""
 
     physics: float = Field(default=100.0, gt=0.0, description="steps of the dynamics [Hz]")
     control: float = Field(default=10.0, gt=0.0, description="guidance and control [Hz]")
@@ -98,9 +98,9 @@ class Scenario(Settings):
     def _ratios(self) -> Iterator[tuple[str, float, str, float]]:
         """Key, rate, and the name and value of the rate that it must divide."""
         rates = self.rates
-        for name in ("control", "log"):
-            yield f"rates.{name}", getattr(rates, name), "physics", rates.physics
+        yield "rates.control", rates.control, "physics", rates.physics
         yield "rates.filter", rates.filter, "control", rates.control
+        yield "rates.log", rates.log, "control", rates.control
         for name in SensorSettings.model_fields:
             rate = getattr(getattr(self.sensors, name), "rate", None)
             if rate is not None:  # the USBL has a period with jitter instead

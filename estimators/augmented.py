@@ -13,6 +13,7 @@ from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters, P
 from estimators.types import Array, Gaussian, Measurement
 
 REMEMBERED = 4  # rejected fixes a new one is compared with
+PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
 AGREEMENT = 0.99  # probability with which two good fixes are found to agree
 FORGOTTEN = 30.0  # age at which a rejected fix says nothing more of the present [s]
 
@@ -47,6 +48,9 @@ class AugmentedFilter:
     than one good fix is lost before the filter follows again, one outlier between two good fixes does not delay it
     beyond the second, and a lone outlier moves nothing. Two outliers pass only if they fall by chance within that
     distance of each other.
+
+    The gate widens while fixes are missing. So a fix that comes after a rejected one and is inside the gate, but
+    outside its inner 95 %, is compared too: else a belief wrong by some metres would be mended by a wrong current.
 
     Args:
         parameters: The vehicle.
@@ -104,7 +108,7 @@ class AugmentedFilter:
 
     def _fuse_fix(self, state: AugmentedState, fix: Measurement) -> AugmentedState:
         belief, innovation = ekf.correct(state.belief, fix, self._position, self._gate)
-        if innovation.accepted:
+        if innovation.accepted and (not state.rejected or innovation.nis <= chi_square(PROBABLE, 2)):
             return AugmentedState(belief, state.outliers)
         H = self._position.jacobian(state.belief.mean)
         now = Rejected(fix.stamp, innovation.residual, H, fix.covariance)
@@ -112,6 +116,8 @@ class AugmentedFilter:
         for earlier in reversed(recent):
             if self._agree(earlier, now):
                 return AugmentedState(self._recover(state.belief, earlier, now), state.outliers - 1)
+        if innovation.accepted:
+            return AugmentedState(belief, state.outliers)
         return AugmentedState(state.belief, state.outliers + 1, (*recent, now))
 
     def _agree(self, earlier: Rejected, now: Rejected) -> bool:

@@ -1,9 +1,7 @@
-"""Navigation of a vehicle that a dock locates acoustically.
-
-Qiu and Li (2019), "A USBL-based navigation method for portable AUV homing".
+"""Navigation of a vehicle that a dock locates acoustically: Qiu and Li (2019), a USBL-based method for homing.
 
 The dock measures the transponder in its own frame and sends it by modem, with its attitude: every fix is old when it
-arrives. Eq. 7 (into the world) and eq. 11 (the current) of the paper are here. World axes are (north, east) throughout.
+arrives. Eq. 7 (into the world) and eq. 11 (the current) are here. World axes are (north, east) throughout.
 """
 
 import math
@@ -155,10 +153,8 @@ class PaperFilter:
         parameters: The vehicle.
         noise: What it believes of its noise; that of the current is not used.
         weights: a_0 .. a_m of eq. 11.
-        transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
-        initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
-        integrator: "midpoint", or the paper's "euler".
-        max_substep: Longest substep of the prediction [s]; the paper's is its step of 0.5.
+        transponder, initial_surge: As for `AugmentedFilter`.
+        integrator, max_substep: As there; the paper's are "euler" and its step of 0.5 s.
     """
 
     def __init__(
@@ -270,8 +266,8 @@ class DockingEstimator:
         Args:
             time: Now [s]; later than at the last tick.
             heading: Compass sample made now [rad], or None.
-            rudder: Rudder angle from now to the next tick [rad], positive to starboard.
-            shaft_speed: Shaft speed from now to the next tick [rad/s].
+            rudder: Mean rudder angle since the last tick [rad], positive to starboard.
+            shaft_speed: Mean shaft speed since the last tick [rad/s].
             fixes: Packets that arrived since the last tick, in any order.
 
         Raises:
@@ -294,15 +290,12 @@ class DockingEstimator:
 
     def _estimate(self, time: float, state: Any) -> DockingEstimate:
         refused = {**self._history.refused, "outlier": 0 if state is None else state.outliers}
-        if state is None:
-            mean, covariance = np.zeros(8), np.zeros((8, 8))
-        else:
-            mean, covariance = state.belief.mean, state.belief.covariance
+        belief = Gaussian(mean=np.zeros(8), covariance=np.zeros((8, 8))) if state is None else state.belief
         return DockingEstimate(
             time=time,
-            mean=mean,
-            covariance=covariance,
-            current=mean[6:],
+            mean=belief.mean,
+            covariance=belief.covariance,
+            current=belief.mean[6:],
             initialised=state is not None,
             refused=refused,
         )

@@ -81,7 +81,7 @@ class History(Generic[State]):
         return self.nodes[-1].state if self.nodes else None
 
     def append(self, time: float, u: Input, measurements: Sequence[Measurement] = ()) -> None:
-        """Adds the tick at `time` [s] with the input held from then on and the measurements made at it.
+        """Adds the tick at `time` [s] with the input that held since the last one and the measurements made at it.
 
         Raises:
             ParameterError: The time is not after that of the last tick, or not a number.
@@ -90,6 +90,8 @@ class History(Generic[State]):
             raise ParameterError(
                 f"tick at {time} s must come after that at {self.nodes[-1].time if self.nodes else 0} s"
             )
+        if self.nodes:
+            self.nodes[-1].input = u
         self.nodes.append(Node(time, u, [m for m in measurements if self._is_sound(m)], is_grid=True))
         # A node leaves by age once nothing that is still accepted can be attached to it: it then only serves as the
         # base of the next.

@@ -118,9 +118,9 @@ def _run(arguments: list[str]) -> int:
         scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
         return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
 
-    from auvsim.cli import drawing
+    from auvsim.cli import products
 
-    return drawing.again(command.log, type(command).__name__.lower())
+    return products.again(command.log, type(command).__name__.lower())
 
 
 def _parse(arguments: list[str]) -> Command:

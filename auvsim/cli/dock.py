@@ -6,12 +6,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
-from auvsim.cli import drawing, report
+from auvsim.cli import products, report
 from auvsim.errors import InputError
 from auvsim.log import TrialLog, write
 from auvsim.scenario import Scenario
 
 PRODUCTS = ("summary.json", "track.png", "estimates.png", "docking.mp4")  # made from trial.nc
+
+WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 
 
 def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool) -> int:
@@ -26,11 +28,11 @@ def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool) ->
     if status == "interrupted":
         print(f"auvsim: interrupted; {path} holds the trial up to there", file=sys.stderr)
         return 130
-    values = drawing.summary(log, out)
+    values = products.summary(log, out)
     if status == "diverged":
         print(f"auvsim: {diagnosis(log)}; {path} holds the trial up to there", file=sys.stderr)
         return 1
-    drawing.plots(log, out)
+    products.plots(log, out)
     if video:
         _video(log, out)
     report.table(values)
@@ -73,8 +75,11 @@ def _trial(scenario: Scenario, seed: int, trial: int) -> TrialLog:
     from auvsim.trial import run_trial
 
     if not fluid.is_warm():
-        with report.waiting("compiling the hydrodynamics (this once; later runs find it in the cache)"):
-            fluid.install()
+        # A short trial calls, and so compiles, all that a long one does.
+        with report.waiting("compiling hydrodynamics and estimator (this once; later runs find them in the cache)"):
+            short = scenario.model_copy(update={"duration": min(scenario.duration, WARM_UP)})
+            if run_trial(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
+                raise KeyboardInterrupt
     with report.TrialProgress() as progress:
         return run_trial(scenario, seed=seed, trial=trial, progress=progress)
 
@@ -83,6 +88,6 @@ def _video(log: TrialLog, out: Path) -> None:
     from auvsim.video import DrawingError
 
     try:
-        drawing.video(log, out)
+        products.video(log, out)
     except DrawingError:
-        print(drawing.NO_OPENGL.format(log=out / "trial.nc"), file=sys.stderr)
+        print(products.NO_OPENGL.format(log=out / "trial.nc"), file=sys.stderr)

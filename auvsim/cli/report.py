@@ -69,7 +69,7 @@ class VideoProgress(_Bar):
 def waiting(text: str) -> Iterator[None]:
     """Says what takes long; always, since nothing else shows that the program is alive."""
     console = Console(stderr=True)
-    console.print(text)
+    console.print(text, soft_wrap=True)
     with console.status(text):
         yield
 
@@ -99,8 +99,8 @@ def table(summary: Mapping[str, Any]) -> None:
     for phase, quality in summary["estimate"].items():
         error = f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}"
         where = "all phases" if phase == "all" else phase.replace("_", " ")
-        table.add_row(f"position error rms [m], its NEES per axis: {where}", error)
-    Console().print(table)
+        table.add_row(f"position rms [m], NEES per axis, {where}", error)
+    Console(markup=False).print(table)  # units stand in brackets
 
 
 def _text(value: Any) -> str:

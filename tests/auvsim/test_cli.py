@@ -30,6 +30,7 @@ class Recorder(SimpleNamespace):
     """What the stand-ins were called with, and what they are to do."""
 
     scenario: Any = None
+    durations: list[float]
     seed: int = -1
     trial: int = -1
     status: str = "complete"
@@ -40,13 +41,14 @@ class Recorder(SimpleNamespace):
 @pytest.fixture
 def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     """Replaces the trial and what draws; metrics and log are the real ones."""
-    recorder = Recorder()
+    recorder = Recorder(durations=[])
 
     class DrawingError(AuvsimError):
         pass
 
     def run_trial(scenario, *, seed=0, trial=0, progress=None):
         recorder.scenario, recorder.seed, recorder.trial = scenario, seed, trial
+        recorder.durations.append(scenario.duration)
         if recorder.error:
             raise recorder.error
         if progress:
@@ -126,6 +128,20 @@ def test_without_opengl(stand_in: Recorder, tmp_path: Path, capsys: pytest.Captu
     assert "apt-get install libegl1 libgl1" in error
     assert f"auvsim video {tmp_path}/trial.nc" in error
     assert "no OpenGL" in fails(capsys, "video", tmp_path / "trial.nc")
+
+
+def test_first_run_says_that_it_compiles(
+    stand_in: Recorder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """A line before, then the whole trial; Ctrl-C while compiling ends the command, not only the compilation."""
+    monkeypatch.setattr(fluid, "is_warm", lambda: False)
+    assert cli.main(["dock", "--out", str(tmp_path / "out")]) == 0
+    assert "compiling hydrodynamics and estimator (this once" in capsys.readouterr().err
+    assert stand_in.durations == [30.0, stand_in.scenario.duration]
+    stand_in.status = "interrupted"
+    assert cli.main(["dock", "--out", str(tmp_path / "other")]) == 130
+    assert len(stand_in.durations) == 3
+    assert files(tmp_path) == {"out"}
 
 
 def test_diverged(stand_in: Recorder, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -149,6 +149,15 @@ def test_phases_split_the_estimates():
     assert phase_at(log, np.array([-0.1, 0.0, 9.9, 10.0, 99.0])).tolist() == [-1, 1, 1, 3, 3]
 
 
+def test_what_the_latch_holds_does_not_count_among_all():
+    errors = np.zeros((40, 8))
+    errors[20:, 0] = 2.0
+    log = estimates(writer(), errors, np.eye(8), phase_times=[(0.0, "final"), (10.0, "docked")])
+    quality = estimate_quality(estimate_errors(log))
+    assert (quality["all"].samples, quality["docked"].samples) == (20, 20)
+    assert (quality["all"].position_rms, quality["docked"].position_rms) == pytest.approx((0.0, 2.0), abs=1e-12)
+
+
 def test_estimates_before_initialisation_do_not_count():
     log = estimates(writer(), np.full((10, 8), 50.0), np.eye(8), initialised=False)
     assert summarise(log).estimate["all"].samples == 0

@@ -56,7 +56,7 @@ def steady_circle(radius: float) -> tuple[Array, float]:
         u, v, r, d = z
         return [*accelerations(z[:3], d), math.hypot(u, v) - radius * r]
 
-    z = fsolve(unbalanced, [0.8, 0.0, 0.8 / radius, math.radians(STEADY_RUDDER[round(radius)])], xtol=1e-12)
+    z = np.asarray(fsolve(unbalanced, [0.8, 0.0, 0.8 / radius, math.radians(STEADY_RUDDER[round(radius)])], xtol=1e-12))
     return z[:3], float(z[3])
 
 

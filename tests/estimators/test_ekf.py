@@ -23,7 +23,9 @@ def belief(seed=0, n=8):
 
 def measurement(value, variance, kind="usbl"):
     value = np.atleast_1d(np.array(value, dtype=float))
-    return Measurement(kind=kind, value=value, covariance=np.diag(np.full(value.size, variance)), stamp=0.0, received=0.0)
+    return Measurement(
+        kind=kind, value=value, covariance=np.diag(np.full(value.size, variance)), stamp=0.0, received=0.0
+    )
 
 
 class Constant:

@@ -46,9 +46,10 @@ def test_accelerations_equal_an_independent_linear_solve(seed):
 @pytest.mark.parametrize(("radius", "speed"), [(200, 0.7998), (100, 0.7991), (40, 0.794), (12, 0.719)])
 def test_steady_circles_of_the_paper(radius, speed):
     nu, rudder = steady_circle(radius)
-    # A positive rudder turns to starboard; tolerances are half a unit of the last printed digit.
+    # A positive rudder turns to starboard; tolerances are half a unit of the last printed digit, for the speed with
+    # the 0.8e-4 m/s that the rounding of the thrust, 1.0368 to 1.037 N, adds.
     assert math.degrees(rudder) == pytest.approx(STEADY_RUDDER[radius], abs=5e-3 if radius == 12 else 5e-4)
-    assert math.hypot(nu[0], nu[1]) == pytest.approx(speed, abs=5e-5 if speed > 0.795 else 5e-4)
+    assert math.hypot(nu[0], nu[1]) == pytest.approx(speed, abs=1.3e-4 if speed > 0.795 else 5.8e-4)
     assert casadi_accelerations(nu, rudder, 0.0, PRESTERO) == pytest.approx(np.zeros(3), abs=1e-9)
 
 
@@ -64,7 +65,7 @@ def test_process_settles_on_the_steady_circle():
 
 def test_eigenvalues_on_a_straight_course():
     x, p = ca.SX.sym("x", 3), PRESTERO.vector()
-    l = planar_model.accelerations(x, ca.SX(0), ca.SX(0), ca.DM(p))
+    l = planar_model.accelerations(x, ca.SX(0), ca.SX(0), ca.SX(p))
     A = np.array(ca.Function("A", [x], [ca.jacobian(l, x)])([0.8, 0.0, 0.0]))
     # Printed: -1.33, -0.31 and surge -0.083 1/s.
     assert sorted(np.linalg.eigvals(A).real) == pytest.approx([-1.33, -0.31, -0.083], abs=5e-3)
@@ -121,7 +122,7 @@ def test_noise_does_not_depend_on_how_an_interval_is_split():
     whole = process.covariance(STATE, INPUT, 0.5)
     # The rule is of second order: substeps of 0.15 to 0.2 s with rates of 1.3 1/s leave (0.26)^2 / 12 = 0.6 % locally.
     assert np.abs(split - whole).max() < 6e-3 * np.abs(whole).max()
-    assert np.diag(whole) == pytest.approx(np.full(8, 0.5e-3), rel=0.75)
+    assert whole[6, 6] == pytest.approx(0.5e-3, rel=1e-12)  # a random walk: density times time
 
 
 def test_euler_has_the_lateral_bias_of_the_old_heading_and_midpoint_has_not():
@@ -129,7 +130,9 @@ def test_euler_has_the_lateral_bias_of_the_old_heading_and_midpoint_has_not():
     x = np.array([0.0, 0.0, 0.0, *nu, 0.0, 0.0])
     bias = {}
     for integrator in ("euler", "midpoint"):
-        coarse = PlanarProcess(PRESTERO, NO_NOISE, integrator=integrator, max_substep=0.5).evaluate(x, (rudder, 0.0), 0.5)
+        coarse = PlanarProcess(PRESTERO, NO_NOISE, integrator=integrator, max_substep=0.5).evaluate(
+            x, (rudder, 0.0), 0.5
+        )
         fine = PlanarProcess(PRESTERO, NO_NOISE, max_substep=0.005).evaluate(x, (rudder, 0.0), 0.5)
         bias[integrator] = np.linalg.norm((coarse - fine)[:2]) / 0.5
     # Velocity error |U| r dt / 2, to the order of r dt = 0.03.
