@@ -1,4 +1,4 @@
-"""The fin map: what each fin does for the effective rudder and elevator, as data of the vehicle (cross tail, X tail, ...)."""
+"""The fin map: what each fin does for the effective rudder and elevator, as data of the vehicle."""
 
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,4 +1,4 @@
-"""Condenses a vehicle's full hydrodynamics to the planar rudder-driven model that estimators believe, and says how well."""
+"""Condenses a vehicle's hydrodynamics to the planar rudder-driven model that estimators believe, and says how well."""
 
 import math
 from dataclasses import dataclass
@@ -25,6 +25,18 @@ class Condensed:
     shaft_speed: float  # that keeps `speed` on a straight course [rad/s]
     acceleration_rms: Array  # (3,) residual in surge, sway, yaw over the fitted states [m/s2, m/s2, rad/s2]
     acceleration_scale: Array  # (3,) rms of the accelerations themselves over the same states
+
+    def shaft_speed_for(self, speed: float) -> float:
+        """Shaft speed [rad/s] that holds a speed through the water [m/s] ahead, by the model's thrust and drag.
+
+        Solves `X_nn n^2 + X_nu n u + X_uu u^2 + X_u u + X_prop = 0` for n >= 0; 0 at rest.
+        """
+        if speed == 0.0:
+            return 0.0
+        p = self.parameters
+        b = p.X_nu * speed
+        c = p.X_uu * speed * abs(speed) + p.X_u * speed + p.X_prop
+        return (-b + math.sqrt(max(b * b - 4 * p.X_nn * c, 0.0))) / (2 * p.X_nn)
 
 
 class _Level:
@@ -132,7 +144,7 @@ def _steady_turn(p: PlanarParameters, rudder: Array, speed: float) -> tuple[Arra
 
 
 def _slopes(level: _Level, speed: float, shaft_speed: float) -> Array:
-    """Derivatives (2, 3) of Y and N with respect to u v, u r and u^2 rudder at a straight course: lift, Munk moment, fins."""
+    """Derivatives (2, 3) of Y and N by u v, u r and u^2 rudder on a straight course: lift, Munk moment, fins."""
     step = 1e-3
     slopes = []
     for v, r, rudder in ((step * speed, 0.0, 0.0), (0.0, step * speed, 0.0), (0.0, 0.0, step)):
@@ -147,8 +159,8 @@ def _fit(
 ) -> tuple[PlanarParameters, Array, Array]:
     """Fits the model's terms to X, Y, N; residual and scale as accelerations (3,).
 
-    In turns v and r go together, so lift terms (u v, u r) are taken from derivatives at a straight course, Coriolis terms
-    (v r, r^2) from the inertia, and only drag, thrust and cross-flow terms are regressed.
+    In turns v and r go together, so lift terms (u v, u r) are taken from derivatives at a straight course, Coriolis
+    terms (v r, r^2) from the inertia, and only drag, thrust and cross-flow terms are regressed.
     """
     forces = np.array([level.evaluate(*state) for state in zip(u, v, r, rudder, n, strict=True)])
     m, x_g, added = level.mass, level.x_g, level.added_mass
@@ -178,13 +190,3 @@ def _fit(
     residual = np.sqrt(np.mean(((forces - fitted) @ inverse.T) ** 2, axis=0))
     scale = np.sqrt(np.mean((forces @ inverse.T) ** 2, axis=0))
     return parameters, residual, scale
-
-
-def steady_shaft_speed(parameters: PlanarParameters, speed: float) -> float:
-    """Shaft speed [rad/s] for a speed through the water straight ahead [m/s], from the planar model's thrust and drag.
-
-    Solves `X_nn n^2 + X_nu n u + X_uu u^2 + X_u u + X_prop = 0` for n >= 0.
-    """
-    a, b = parameters.X_nn, parameters.X_nu * speed
-    c = parameters.X_uu * speed * abs(speed) + parameters.X_u * speed + parameters.X_prop
-    return (-b + math.sqrt(max(b * b - 4 * a * c, 0.0))) / (2 * a)

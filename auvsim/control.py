@@ -1,28 +1,26 @@
 """Autopilot: heading, depth (through pitch) and open-loop water speed, from the compass and the depth gauge alone."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from pydantic import Field
 
-from auvsim.condense import steady_shaft_speed
 from auvsim.frames import wrap
 from auvsim.navigation import Commands
 from auvsim.sensors.reading import Reading
 from auvsim.settings import Settings
-from estimators.planar_model import PlanarParameters
 
 
 class ControlSettings(Settings):
     """Gains of the autopilot."""
 
-    heading_gain: float = Field(2.0, gt=0, description="rudder per heading error")
-    yaw_rate_gain: float = Field(2.5, ge=0, description="rudder per yaw rate [s]")
-    pitch_gain: float = Field(2.5, gt=0, description="stern plane per pitch error")
-    pitch_rate_gain: float = Field(2.0, ge=0, description="stern plane per pitch rate [s]")
-    depth_gain: float = Field(0.12, gt=0, description="pitch per depth error [rad/m]")
-    depth_integral_gain: float = Field(0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
-    pitch_limit_deg: float = Field(20.0, gt=0, le=45, description="largest commanded pitch [deg]")
+    heading_gain: float = Field(default=2.0, gt=0, description="rudder per heading error [rad/rad]")
+    yaw_rate_gain: float = Field(default=2.5, ge=0, description="rudder per yaw rate [s]")
+    pitch_gain: float = Field(default=2.5, gt=0, description="stern plane per pitch error [rad/rad]")
+    pitch_rate_gain: float = Field(default=2.0, ge=0, description="stern plane per pitch rate [s]")
+    depth_gain: float = Field(default=0.12, gt=0, description="pitch per depth error [rad/m]")
+    depth_integral_gain: float = Field(default=0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
+    pitch_limit_deg: float = Field(default=20.0, gt=0, le=45, description="largest commanded pitch [deg]")
 
 
 class _Smoother:
@@ -57,7 +55,7 @@ class Autopilot:
 
     Args:
         settings: gains.
-        parameters: planar model of the vehicle, for the shaft speed that a water speed needs.
+        shaft_speed: the shaft speed [rad/s] that holds a speed through the water >= 0 [m/s].
         fin_limit: largest effective rudder and stern plane [rad].
         shaft_limit: largest shaft speed [rad/s].
         period: time between calls [s].
@@ -66,12 +64,12 @@ class Autopilot:
     def __init__(
         self,
         settings: ControlSettings,
-        parameters: PlanarParameters,
+        shaft_speed: Callable[[float], float],
         fin_limit: float,
         shaft_limit: float,
         period: float,
     ) -> None:
-        self._settings, self._parameters = settings, parameters
+        self._settings, self._shaft_for = settings, shaft_speed
         self._fin_limit, self._shaft_limit, self._period = fin_limit, shaft_limit, period
         self._pitch_limit = math.radians(settings.pitch_limit_deg)
         # Tracking indices (acceleration noise x period^2 / measurement noise) of the default sensors.
@@ -119,6 +117,6 @@ class Autopilot:
 
     def _shaft_speed(self, speed: float) -> float:
         if speed != self._shaft[0]:
-            ahead = steady_shaft_speed(self._parameters, abs(speed)) if speed else 0.0
+            ahead = self._shaft_for(abs(speed)) if speed else 0.0
             self._shaft = (speed, math.copysign(min(ahead, self._shaft_limit), speed))
         return self._shaft[1]

@@ -56,7 +56,7 @@ def event_ticks(axes: Axes, log: TrialLog) -> None:
     usbl, estimate = log["usbl"], log["estimate"]
     arrived = usbl["received"][~usbl["lost"]]
     refused = estimate["time"][1:][np.diff(estimate["refused"]) > 0]
-    for times, colour, width in ((arrived, ARRIVED, 1.0), (refused, OUTLIER, 2.2)):
+    for times, colour, width in ((arrived, ARRIVED, 1.0), (refused, OUTLIER, 1.6)):
         axes.vlines(times, 0.0, 0.07, color=colour, lw=width, transform=axes.get_xaxis_transform(), zorder=4)
 
 

@@ -1,4 +1,4 @@
-"""The dm_env face of a trial, through `dm_control.rl.control`: true state in, actuator commands out, one step a control period.
+"""The dm_env face of a trial, through `dm_control.rl.control`: truth in, commands out, once a control period.
 
 For learning and for controllers of one's own. No sensors or estimators stand between: the observation is the truth.
 """
@@ -25,9 +25,9 @@ from auvsim.world import World, compose
 class Docking(control.Task):
     """Bring the vehicle into the dock.
 
-    Action (3,): rudder (positive to starboard), stern plane (positive dives) and shaft speed, each as a fraction of its limit.
-    Reward: progress of the nose towards the latched place [m], and 100 when the latch closes. An episode ends docked, or by the
-    time limit.
+    Action (3,): rudder (positive to starboard), stern plane (positive dives) and shaft speed, each as a fraction of
+    its limit. Reward: progress of the nose towards the latched place [m], and 100 when the latch closes. An episode
+    ends docked, or by the time limit.
     """
 
     def __init__(self, plan: scenario.Scenario, seed: int) -> None:
@@ -37,8 +37,7 @@ class Docking(control.Task):
         self._pose = DockPose(depth=plan.dock.depth, heading=math.radians(plan.dock.heading_deg))
         self._ticks = round(plan.rates.physics / plan.rates.control)
         believed = condense.condense(plan.vehicle.model, plan.estimator.model_speed, plan.world.water_density)
-        start = plan.vehicle.start.speed
-        self._shaft = condense.steady_shaft_speed(believed.parameters, start) if start else 0.0
+        self._shaft = believed.shaft_speed_for(plan.vehicle.start.speed)
         self._to_dock = rotation(self._pose.roll, self._pose.pitch, self._pose.heading).T
         self._distance = math.nan
         self._world: World | None = None
@@ -92,8 +91,11 @@ class Docking(control.Task):
         return float(np.linalg.norm(self._nose() - (self._dock.latched, 0.0, 0.0)))
 
     def get_observation(self, physics: Any) -> "collections.OrderedDict[str, np.ndarray]":
-        """Nose in the dock's frame (3,) [m], roll, pitch and heading off the dock's axis (3,) [rad], velocity over ground nu (6,),
-        water velocity in the dock's frame (3,) [m/s], fin angles (n,) [rad] and shaft speed (1,) [rad/s]."""
+        """The truth, by name.
+
+        nose (3,) in the dock frame [m]; attitude (3,): roll, pitch, heading off the axis [rad]; velocity (6,) over
+        ground, nu [m/s, rad/s]; current (3,) in the dock's frame [m/s]; fins (n,) [rad]; shaft_speed (1,) [rad/s].
+        """
         truth = self.world.truth()
         roll, pitch, yaw = truth.attitude.tolist()
         return collections.OrderedDict(
@@ -120,7 +122,7 @@ class Docking(control.Task):
 
 
 class _Environment(control.Environment):
-    """Steps the physics through `World`, which looks for contact and closes the latch; a diverged episode ends with discount 0."""
+    """Steps through `World`, which looks for contact and closes the latch; a diverged episode ends with discount 0."""
 
     def step(self, action: Any) -> dm_env.TimeStep:
         if self._reset_next_step:

@@ -17,6 +17,10 @@ class DivergenceError(AuvsimError):
     exit_code = 1
 
 
+class DrawingError(AuvsimError):
+    """There is no OpenGL to draw with; everything but video works without."""
+
+
 def unknown_name(kind: str, name: str, known: "list[str]") -> InputError:
     """An error that lists the names that do exist: `no vehicle 'remus'; there are lauv, remus100`."""
     return InputError(f"no {kind} '{name}'; there are {', '.join(sorted(known)) or 'none'}")

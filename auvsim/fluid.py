@@ -1,13 +1,13 @@
 """The native passive-force callback that puts hydrodynamics into MuJoCo.
 
-After velocities are known MuJoCo calls `mjcb_passive`. For every body with a coefficient record in `mjModel.body_user` (see
-`forces`; filled by `hydrodynamics`) the callback adds its forces to `qfrc_passive` and, for hulls, `J' M_A J` to the
-joint-space inertia `mjData.M`, which it then factorises again. All that follows in the step (contact, implicit integrators,
-each Runge-Kutta stage) uses the sum, so added mass is exact in free motion and in contact.
+After velocities are known MuJoCo calls `mjcb_passive`. For every body with a coefficient record in `mjModel.body_user`
+(see `forces`; filled by `hydrodynamics`) the callback adds its forces to `qfrc_passive` and, for hulls, `J' M_A J` to
+the joint-space inertia `mjData.M`, which it then factorises again. All that follows in the step (contact, implicit
+integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in free motion and in contact.
 
 With v_r the hull's velocity relative to the water, omega its angular velocity and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is
-`-M_A J qacc` (in M) plus `M_A [a_c + omega x v_r - (d(J)/dt qvel); 0]`. The water's own pressure adds `rho V a_c` at the centre of
-buoyancy (Auton, Hunt & Prud'homme 1988).
+`-M_A J qacc` (in M) plus `M_A [a_c + omega x v_r - (d(J)/dt qvel); 0]`. The water's own pressure adds `rho V a_c` at
+the centre of buoyancy (Auton, Hunt & Prud'homme 1988).
 
 The water is a local expansion in `mjData.userdata`, one slot of `WATER` numbers a vehicle:
 `[time, place (3), velocity (3), dv/dt (3), dv_i/dx_j (9)]` in MuJoCo's world axes. A reset zeroes it.
@@ -24,6 +24,7 @@ import mujoco
 from llvmlite import ir
 from numba import cfunc, njit, types
 from numba.core import cgutils
+from numba.core.caching import FunctionCache
 from numba.extending import intrinsic
 
 from auvsim import layout
@@ -47,7 +48,7 @@ _SWIRL = 10  # offset of a propeller's swirl recovery in its record
 
 
 @intrinsic
-def _load_pointer(typingctx: Any, address: Any):
+def _load_pointer(typingctx: Any, address: Any = None) -> Any:
     """The pointer-sized number at an address."""
 
     def codegen(context, builder, signature, args):
@@ -59,7 +60,7 @@ def _load_pointer(typingctx: Any, address: Any):
 
 def _cast(kind: Any):
     @intrinsic
-    def cast(typingctx: Any, address: Any):
+    def cast(typingctx: Any, address: Any = None) -> Any:
         def codegen(context, builder, signature, args):
             return builder.inttoptr(args[0], context.get_value_type(types.CPointer(kind)))
 
@@ -73,7 +74,7 @@ _integers = _cast(types.int32)
 
 
 @intrinsic
-def _scratch(typingctx: Any):
+def _scratch(typingctx: Any = None) -> Any:
     """Stack space for 42 numbers: a hull's Jacobian."""
 
     def codegen(context, builder, signature, args):
@@ -140,7 +141,8 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
         c, o, v0, v1, v2, w0, w1, w2, r01 * e0 + r11 * e1 + r21 * e2, r02 * e0 + r12 * e1 + r22 * e2
     )
 
-    # The acceleration that M does not carry: omega x (omega x p), p from the free joint's origin to the hull's, in world axes.
+    # The acceleration that M does not carry: omega x (omega x p), p from the free joint's origin to the hull's, in
+    # world axes.
     j0 = dof0 + 3
     p0, p1, p2 = 0.0, 0.0, 0.0  # omega x p = velocity of the hull's origin less that of the joint's
     for k in range(3):
@@ -292,7 +294,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
                     rows,
                     J,
                 )
-            elif kind == FIN_KIND or kind == PROPELLER_KIND:
+            elif kind in (FIN_KIND, PROPELLER_KIND):
                 dof = dofadr[base] + dofnum[base] - 1
                 _surface(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
         if touched:
@@ -307,7 +309,7 @@ _callback: Any = None
 
 def _library() -> ctypes.CDLL:
     """MuJoCo's shared library, already loaded by the `mujoco` package."""
-    folder = Path(mujoco.__file__).parent
+    folder = Path(str(mujoco.__file__)).parent
     for pattern in ("libmujoco.so.*", "libmujoco*.dylib", "mujoco.dll"):
         for path in folder.glob(pattern):
             return ctypes.CDLL(os.fspath(path))
@@ -318,12 +320,11 @@ def is_warm() -> bool:
     """Whether `install` needs no compilation: it ran before, in this process or, through numba's cache, in another."""
     if _callback is not None:
         return True
-    folders = [Path(__file__).parent / "__pycache__"]
-    if "NUMBA_CACHE_DIR" in os.environ:
-        folders.append(Path(os.environ["NUMBA_CACHE_DIR"]))
-    else:
-        folders.append(Path.home() / ".cache" / "numba")
-    return any(any(folder.glob("**/fluid._build*.nbi")) for folder in folders if folder.is_dir())
+    try:
+        folder = Path(FunctionCache(_build).cache_path)
+    except RuntimeError:  # numba finds no folder that it may write to
+        return False
+    return any(folder.glob("fluid._build*.nbi"))
 
 
 def install() -> None:

@@ -1,8 +1,8 @@
 """Forces of hull, fin and propeller as compiled functions of the velocity relative to the water.
 
 All vectors here are in the element's own MuJoCo axes (x forward, y port, z up); `hydrodynamics` converts the SNAME
-coefficients once. A coefficient record `c` starts at `o`; its layout is `HULL`, `FIN` and `PROPELLER` below, so that the same
-code serves a NumPy array and a row of `mjModel.body_user`.
+coefficients once. A coefficient record `c` starts at `o`; its layout is `HULL`, `FIN` and `PROPELLER` below, so that
+the same code serves a NumPy array and a row of `mjModel.body_user`.
 """
 
 import math
@@ -53,8 +53,8 @@ def _damped(c, o, i, v0, v1, v2, w0, w1, w2):
 def hull_force(c, o, v0, v1, v2, w0, w1, w2, g1, g2):
     """Velocity-dependent force and moment of a hull about its origin, without the inertial `-M_A dnu/dt`.
 
-    Coriolis of the added mass (Fossen 2021, eq. 6.44, Kirchhoff), linear and quadratic damping, cross-flow drag by strips
-    (Faltinsen 1990, sec. 6; both transverse velocities share one resultant), and body lift of a slender hull
+    Coriolis of the added mass (Fossen 2021, eq. 6.44, Kirchhoff), linear and quadratic damping, cross-flow drag by
+    strips (Faltinsen 1990, sec. 6; both transverse velocities share one resultant), and body lift of a slender hull
     with a separating tail, which changes ends when the flow does.
 
     Args:
@@ -116,8 +116,8 @@ def fin_force(c, o, v0, v1):
     """Lift and drag of a fin in the plane across its span, at its hinge axis.
 
     Attached flow: `C_L = slope sin(alpha) cos(alpha)`, parasitic and induced drag; separated flow: a flat plate's
-    normal force; blended smoothly over +-5 degrees round the stall angle (Beard & McLain 2012, eq. 4.9). The same holds for flow
-    from astern, with a reduced slope (the sharp edge leads).
+    normal force; blended smoothly over +-5 degrees round the stall angle (Beard & McLain 2012, eq. 4.9). The same
+    holds for flow from astern, with a reduced slope (the sharp edge leads).
 
     Args:
         c: coefficients, with the record at `o`.
@@ -150,8 +150,8 @@ def fin_force(c, o, v0, v1):
 def propeller_force(c, o, v0, n):
     """Thrust on the vehicle and torque on the shaft of an open propeller.
 
-    `K_T` and `K_Q` are linear in the advance number J = (1 - w) v0 / (n D) (Fossen 2021, eq. 9.8); where the water meets the
-    propeller from the other side (J < 0) they keep their bollard value.
+    `K_T` and `K_Q` are linear in the advance number J = (1 - w) v0 / (n D) (Fossen 2021, eq. 9.8); where the water
+    meets the propeller from the other side (J < 0) they keep their bollard value.
 
     Args:
         c: coefficients, with the record at `o`.

@@ -1,8 +1,9 @@
-"""Docking guidance: search, homing to the gate on the dock's axis, approach along a line, the last metres, go-around, abort.
+"""Docking guidance: search, homing to the gate on the dock's axis, approach, the last metres, go-around, abort.
 
 The law is line of sight with the crab angle taken from the estimated current. Where a cross current would turn the
-heading too far off the dock's axis for the funnel, the approach line is turned instead, so that it still runs through the entrance.
-Coordinates: dock frame, x along the course of a vehicle that enters, y to starboard, origin at the centre of the mouth.
+heading too far off the dock's axis for the funnel, the approach line is turned instead, so that it still runs through
+the entrance. Coordinates: dock frame, x along the course of a vehicle that enters, y to starboard, origin at the
+centre of the mouth.
 """
 
 import math
@@ -34,22 +35,31 @@ class Phase(IntEnum):
 class GuidanceSettings(Settings):
     """How the vehicle comes in."""
 
-    homing_speed: float = Field(1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
-    approach_speed: float = Field(1.0, gt=0, description="speed through the water on the approach [m/s]")
-    gate_distance: float = Field(200.0, gt=0, description="distance of the gate before the entrance [m]")
-    gate_radius: float = Field(20.0, gt=0, description="distance at which the gate counts as reached [m]")
-    retry_distance: float = Field(100.0, gt=0, description="distance of the gate of later attempts [m]")
-    lookahead: float = Field(7.0, gt=0, description="lookahead of the line of sight [m]")
+    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
+    approach_speed: float = Field(default=1.0, gt=0, description="speed through the water on the approach [m/s]")
+    gate_distance: float = Field(default=200.0, gt=0, description="distance of the gate before the entrance [m]")
+    gate_radius: float = Field(default=20.0, gt=0, description="distance at which the gate counts as reached [m]")
+    retry_distance: float = Field(default=100.0, gt=0, description="distance of the gate of later attempts [m]")
+    lookahead: float = Field(default=7.0, gt=0, description="lookahead of the line of sight [m]")
     heading_limit_deg: float = Field(
-        20.0,
+        default=20.0,
         gt=0,
         lt=60,
         description="largest angle between heading and dock axis before the line is turned instead [deg]",
     )
-    final_distance: float = Field(20.0, gt=0, description="distance at which the last metres begin [m]")
-    attempts: int = Field(3, ge=1, description="attempts before the vehicle gives up")
-    fix_timeout: float = Field(30.0, gt=0, description="time without a fix after which an approach is broken off [s]")
-    lost_timeout: float = Field(180.0, gt=0, description="time without a fix after which the vehicle gives up [s]")
+    final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
+    attempts: int = Field(default=3, ge=1, description="attempts before the vehicle gives up")
+    fix_timeout: float = Field(
+        default=30.0, gt=0, description="time without a fix after which an approach is broken off [s]"
+    )
+    uncertain_timeout: float = Field(
+        default=10.0,
+        gt=0,
+        description="time with an off-axis deviation above the mouth's radius after which it is broken off [s]",
+    )
+    lost_timeout: float = Field(
+        default=180.0, gt=0, description="time without a fix after which the vehicle gives up [s]"
+    )
 
 
 class Command(NamedTuple):
@@ -78,7 +88,7 @@ class Geometry:
 
 
 def approach_course(axis: float, speed: float, current: tuple[float, float], limit: float) -> float:
-    """Course over ground of the approach line [rad]: the dock's axis, or turned so that the heading keeps within `limit` of it.
+    """Course over ground of the approach line [rad]: the axis, or turned to keep the heading within `limit` of it.
 
     Args:
         axis: course of the dock's axis [rad].
@@ -95,7 +105,7 @@ def approach_course(axis: float, speed: float, current: tuple[float, float], lim
 
 
 def heading_for_course(course: float, speed: float, current: tuple[float, float]) -> float:
-    """Heading [rad] whose course over ground is `course` [rad] (crab angle); straight across the current where it is too strong."""
+    """Heading [rad] whose course over ground is `course` [rad], or the nearest to it in too strong a current."""
     across = current[1] * math.cos(course) - current[0] * math.sin(course)
     return course - math.asin(max(-0.95, min(0.95, across / speed)))
 
@@ -118,6 +128,7 @@ class Guidance:
         self._axis_sum = (0.0, 0.0)
         self._depth_sum, self._fixes = 0.0, 0
         self._last_fix = 0.0
+        self._certain = 0.0  # when the position across the axis was last known better than the mouth's radius
         self._hold: tuple[float, float] | None = None  # heading and depth held in search
         self._side = 1.0
         self._leg = 0
@@ -180,7 +191,7 @@ class Guidance:
         return self._approach(time, estimate, silence, north, east, heading, current)
 
     def _nose(self, time: float, estimate: Estimate, heading: float) -> tuple[float, float, tuple[float, float]]:
-        """The nose now (north, east) by dead reckoning from the last estimate, and the current; updates along and cross."""
+        """The nose now (north, east) by dead reckoning from the last estimate, and the current."""
         u, v, _ = estimate.velocity.tolist()
         current_north, current_east = estimate.current.tolist()
         cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
@@ -220,9 +231,13 @@ class Guidance:
         current: tuple[float, float],
     ) -> Command:
         s, axis = self._s, self.axis
+        c, cos, sin = estimate.covariance, math.cos(axis), math.sin(axis)
+        variance = sin * sin * c[0, 0] - 2 * sin * cos * c[0, 1] + cos * cos * c[1, 1]  # across the axis
+        if variance <= self._g.mouth_radius**2:
+            self._certain = time
         if self.phase == Phase.APPROACH and self.along > -s.final_distance:
             self._enter(Phase.FINAL, time, f"{-self.along:.0f} m before the entrance, {self.cross:+.2f} m off the axis")
-        reason = self._reason_to_break_off(time, estimate, silence)
+        reason = self._reason_to_break_off(time, silence)
         if reason:
             return self._break_off(time, reason, north, east, current)
         line = approach_course(axis, s.approach_speed, current, self._limit)
@@ -231,18 +246,15 @@ class Guidance:
         course = line - math.atan2(error, s.lookahead)
         return Command(heading_for_course(course, s.approach_speed, current), self.dock_depth, s.approach_speed)
 
-    def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
+    def _reason_to_break_off(self, time: float, silence: float) -> str | None:
         s, g = self._s, self._g
         if silence > s.fix_timeout:
             return f"no fix for {silence:.0f} s"
         if self.phase != Phase.FINAL:
             return None
-        c = estimate.covariance
-        mean, half = 0.5 * (c[0, 0] + c[1, 1]), 0.5 * (c[0, 0] - c[1, 1])
-        sigma = math.sqrt(max(0.0, mean + math.hypot(half, c[0, 1])))
-        if sigma > g.mouth_radius:
-            return f"position uncertain by {sigma:.2f} m, mouth radius {g.mouth_radius:.2f} m"
-        if -0.5 < self.along and abs(self.cross) > g.mouth_radius + 0.5:
+        if time - self._certain > s.uncertain_timeout:
+            return f"off-axis position uncertain by more than the mouth's radius for {time - self._certain:.0f} s"
+        if self.along > -0.5 and abs(self.cross) > g.mouth_radius + 0.5:
             return f"entrance missed by {abs(self.cross):.2f} m"
         if self.along > g.latched + 1.5:
             return "entrance passed without capture"

@@ -1,8 +1,9 @@
 """The hydrodynamic coefficients of a vehicle: read from its MJCF, checked, and put where the fluid callback finds them.
 
-A body `hull` is described by `<custom><numeric>` fields named `hull_<field>`, in SNAME form and forward-starboard-down axes about
-the body's origin, which is its centre of buoyancy; matrices are Fossen's positive M_A and D. Fins and propellers are bodies
-of their own with their own fields. PyMJCF prefixes bodies and fields alike when a vehicle is attached.
+A body `hull` is described by `<custom><numeric>` fields named `hull_<field>`, in SNAME form and forward-starboard-down
+axes about the body's origin, which is its centre of buoyancy; matrices are Fossen's positive M_A and D. Fins and
+propellers are bodies of their own with their own fields. PyMJCF prefixes bodies and fields alike when a vehicle is
+attached.
 """
 
 from typing import Any, NamedTuple
@@ -120,8 +121,8 @@ def _record(body: Body, slot: int, density: float) -> Array:
 def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
     """Puts the coefficients of all vehicles into a compiled model and the callback into MuJoCo.
 
-    Constraint weights (`body_invweight0`, `dof_invweight0`) are recomputed from the summed inertia, so that contacts and welds act
-    on the body with its added mass; call again after `mj_setConst`.
+    Constraint weights (`body_invweight0`, `dof_invweight0`) are recomputed from the summed inertia, so that contacts
+    and welds act on the body with its added mass; call again after `mj_setConst`.
 
     Args:
         model: changed in place.
@@ -173,13 +174,13 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
         if body.kind == "hull" and model.body_simple[base]:
             raise InputError(
-                f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of mass"
-                " is its origin; move the centre of mass or add a hinged body"
+                f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of"
+                " mass is its origin; move the centre of mass or add a hinged body"
             )
 
 
 def _weigh_constraints(model: mujoco.MjModel) -> None:
-    """Recomputes `body_invweight0` and `dof_invweight0` as `mj_setConst` does, but with the added mass in the inertia."""
+    """Recomputes `body_invweight0` and `dof_invweight0` as `mj_setConst` does, with the added mass in the inertia."""
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     inverse = np.zeros((model.nv, model.nv))

@@ -57,8 +57,8 @@ def verify() -> None:
     Raises:
         AuvsimError: MuJoCo's structs are laid out otherwise than its introspection says.
     """
-    xml = "<mujoco><size nuser_body='2' nuserdata='3'/><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
-    model = mujoco.MjModel.from_xml_string(xml)
+    body = "<worldbody><body><freejoint/><geom size='1'/></body></worldbody>"
+    model = mujoco.MjModel.from_xml_string(f"<mujoco><size nuser_body='2' nuserdata='3'/>{body}</mujoco>")
     data = mujoco.MjData(model)
     for struct, owner, names in (
         ("mjModel", model, ("body_user", "body_weldid", "body_dofadr", "dof_parentid", "M_rowadr", "body_rootid")),

@@ -35,6 +35,9 @@ class Dock:
     latched: float  # where the latch holds the nose, along the axis from the mouth [m]
 
 
+_MARKS = {"vehicle": '<body name="hull"', "dock": '<site name="capture"'}  # what every MJCF of a kind has
+
+
 def models_folder() -> Path:
     """The folder of the models: inside the installed package, else beside it in a checkout."""
     for folder in (Path(__file__).parent / "models", Path(__file__).parent.parent / "models"):
@@ -59,7 +62,8 @@ def _load(kind: str, name: str) -> Any:
         folder = models_folder()
         path = folder / name / f"{name}.xml"
         if not path.is_file():
-            raise unknown_name(kind, name, [p.parent.name for p in folder.glob("*/*.xml") if p.stem == p.parent.name])
+            known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
+            raise unknown_name(kind, name, known)
     try:
         return mjcf.from_xml_string(_read(path), model_dir=str(path.parent))
     except InputError:

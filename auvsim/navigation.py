@@ -1,8 +1,8 @@
-"""Hands what sensors and modem deliver to an estimator, and its estimate to guidance; any estimator that keeps the contract.
+"""Hands what sensors and modem deliver to an estimator, and its estimate to guidance.
 
-An estimator is made by `factory(parameters, scenario) -> Navigator`: `parameters` is the planar model it may believe (see
-`condense`), `scenario` the full `auvsim.scenario.Scenario`. Named factories are `augmented_ekf` (paper 1, section 12) and `paper`
-(paper 1, sections 6 to 10); any other is given as `package.module:factory`.
+An estimator is made by `factory(parameters, scenario) -> Navigator`: `parameters` is the planar model it may believe
+(see `condense`), `scenario` the full `auvsim.scenario.Scenario`. Named factories are `augmented_ekf` (paper 1, section
+12) and `paper` (paper 1, sections 6 to 10); any other is given as `package.module:factory`.
 """
 
 import importlib
@@ -16,8 +16,9 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 from pydantic import Field
 
+from auvsim import library
 from auvsim.allocation import Allocation
-from auvsim.errors import InputError, unknown_name
+from auvsim.errors import AuvsimError, InputError, unknown_name
 from auvsim.frames import Array, wrap
 from auvsim.sensors.reading import Reading
 from auvsim.settings import Settings
@@ -71,18 +72,20 @@ class Navigator(Protocol):
 class EstimatorSettings(Settings):
     """Which estimator, and what it believes of the noises."""
 
-    factory: str = Field("augmented_ekf", description="augmented_ekf, paper, or package.module:factory of your own")
-    compass_deg: float = Field(1.0, gt=0, description="compass noise it believes, each reading [deg]")
-    position_noise: float = Field(4e-4, ge=0, description="process noise of position [m2/s]")
-    heading_noise: float = Field(1e-6, ge=0, description="process noise of heading [rad2/s]")
-    velocity_noise: float = Field(1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
-    yaw_rate_noise: float = Field(1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
-    current_noise: float = Field(
-        1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 for turning currents"
+    factory: str = Field(
+        default="augmented_ekf", description="augmented_ekf, paper, or package.module:factory of your own"
     )
-    dock_heading_deg: float = Field(0.3, ge=0, description="error of the dock's compass it believes [deg]")
+    compass_deg: float = Field(default=1.0, gt=0, description="compass noise it believes, each reading [deg]")
+    position_noise: float = Field(default=4e-4, ge=0, description="process noise of position [m2/s]")
+    heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
+    velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_rate_noise: float = Field(default=1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
+    current_noise: float = Field(
+        default=1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 for turning currents"
+    )
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it believes [deg]")
     model_speed: float = Field(
-        1.0, gt=0, description="speed through the water at which the planar model is condensed [m/s]"
+        default=1.0, gt=0, description="speed through the water at which the planar model is condensed [m/s]"
     )
 
 
@@ -90,7 +93,8 @@ class DockingNavigator:
     """The docking estimators of `estimators.docking` behind the contract.
 
     Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
-    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the gauge's, smoothed.
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the
+    gauge's, smoothed.
     """
 
     def __init__(self, estimator: DockingEstimator, allocation: Allocation, compass_rate: float) -> None:
@@ -128,12 +132,12 @@ class DockingNavigator:
                         pitch=pitch,
                         roll=roll,
                         sequence=reading.sequence,
-                    )  # fmt: skip
+                    )
                 )
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
-            mean = sum(drives) / len(drives)
-            rudder, shaft_speed = self._allocation.effective(mean[:-1])[0], float(mean[-1])
+            drive = np.mean(drives, axis=0).tolist()
+            rudder, shaft_speed = self._allocation.effective(drive[:-1])[0], drive[-1]
         result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
         mean = result.mean
         self._yaw_rate = float(mean[5])
@@ -158,7 +162,7 @@ class DockingNavigator:
         return wrap(first + sum(offsets) / len(offsets))
 
     def _smooth_depth(self, stamp: float, depth: float) -> None:
-        """Steady-state alpha-beta filter of the gauge (Bar-Shalom 2001, sec. 6.5), gains for 0.05 m and about 0.02 m/s2."""
+        """Alpha-beta filter of the gauge (Bar-Shalom 2001, sec. 6.5), steady-state gains for 0.05 m and 0.02 m/s2."""
         if self._depth is None:
             self._depth, self._depth_stamp = depth, stamp
             return
@@ -173,9 +177,7 @@ class DockingNavigator:
 def _docking(
     parameters: PlanarParameters, scenario: Any, kind: Callable[..., Any], base: DockingNoise
 ) -> DockingNavigator:
-    """A docking filter for a scenario: what it believes comes from the estimator's settings, never from the sensors' draws."""
-    from auvsim import library
-
+    """A docking filter for a scenario; what it believes are the estimator's settings, never the sensors' draws."""
     settings: EstimatorSettings = scenario.estimator
     usbl = scenario.sensors.usbl
     step = 1.0 / scenario.rates.filter
@@ -207,7 +209,7 @@ def paper(parameters: PlanarParameters, scenario: Any) -> Navigator:
 FACTORIES: dict[str, Callable[[PlanarParameters, Any], Navigator]] = {"augmented_ekf": augmented_ekf, "paper": paper}
 
 
-def find_factory(name: str) -> Callable[[PlanarParameters, Any], Navigator]:
+def find_factory(name: str) -> Callable[[PlanarParameters, Any], Any]:
     """The estimator factory of a name or of `package.module:factory` (also found in the working folder).
 
     Raises:
@@ -236,7 +238,13 @@ def build(name: str, parameters: PlanarParameters, scenario: Any) -> Navigator:
     Raises:
         InputError: there is no such factory, or it does not return a Navigator.
     """
-    navigator = find_factory(name)(parameters, scenario)
+    factory = find_factory(name)
+    try:
+        navigator = factory(parameters, scenario)
+    except AuvsimError:
+        raise
+    except Exception as error:  # a user's factory may fail in any way
+        raise InputError(f"estimator '{name}' cannot be made: {type(error).__name__}: {error}") from error
     for method in ("update", "reset"):
         if not callable(getattr(navigator, method, None)):
             raise InputError(f"estimator '{name}' made a {type(navigator).__name__} without {method}(); see Navigator")

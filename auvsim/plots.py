@@ -181,10 +181,10 @@ def _depth(axes: Axes, log: TrialLog) -> None:
     axes.axhline(log.number("dock_depth"), ls=":", color=DOCK, lw=1.3, label="dock")
     phase_line(axes, log, truth["time"], truth["position"][:, 2])
     axes.plot(estimate["time"][seen], estimate["position"][seen, 2], **ESTIMATE)
-    depths = np.append(truth["position"][:, 2], log.number("dock_depth"))
+    depths = np.concatenate([truth["position"][:, 2], estimate["position"][seen, 2], [log.number("dock_depth")]])
     depths = depths[np.isfinite(depths)]
     low, high = float(depths.min()), float(depths.max())
-    margin = 0.1 * (high - low) + 0.2
+    margin = 0.1 * (high - low) + 0.05
     axes.set(ylim=(high + margin, low - margin))
     dress(axes, "Depth (truth in the colours of the phases)", "time [s]", "depth [m]")
     handles = [line for line in axes.get_lines() if line.get_label() in ("command", "dock", "estimate")]
@@ -239,8 +239,8 @@ def _error(axes: Axes, errors: EstimateErrors, error: Array, sigma: Array) -> No
     axes.axhline(0.0, color="#888888", lw=0.7)
     free = seen & (errors.phase != Phase.DOCKED)
     if free.any():
-        # Neither the first, uninformed band nor what follows the latch may flatten the rest.
-        limit = max(float(np.abs(error[free]).max()), float(np.percentile(2.0 * sigma[free], 90.0)), 1e-6)
+        # Neither the first, uninformed band nor the blows of contact and latch may flatten the rest.
+        limit = max(*np.percentile(np.abs(error[free]), [99.0]), *np.percentile(2.0 * sigma[free], [90.0]), 1e-6)
         axes.set(ylim=(-1.2 * limit, 1.2 * limit))
 
 

@@ -1,4 +1,4 @@
-"""One closed-loop docking trial: truth -> sensors -> estimator -> guidance -> control -> truth, and a log of all of it."""
+"""One docking trial: truth -> sensors -> estimator -> guidance -> control -> truth, and a log of all of it."""
 
 import math
 import time as wall
@@ -89,12 +89,13 @@ class Loop:
             plan.guidance, Geometry(nose=vehicle.nose, mouth_radius=dock.mouth_radius, latched=dock.latched)
         )
         self.autopilot = Autopilot(
-            plan.control, believed.parameters, vehicle.allocation.limit, vehicle.shaft_limit, 1.0 / rates.control
+            plan.control, believed.shaft_speed_for, vehicle.allocation.limit, vehicle.shaft_limit, 1.0 / rates.control
         )
         sensors = plan.sensors
         self._sensors = [
-            (kind(settings, noise(kind.name)), round(rates.control / settings.rate))
-            for kind, settings in ((Compass, sensors.compass), (Depth, sensors.depth), (Feedback, sensors.feedback))
+            (Compass(sensors.compass, noise("compass")), round(rates.control / sensors.compass.rate)),
+            (Depth(sensors.depth, noise("depth")), round(rates.control / sensors.depth.rate)),
+            (Feedback(sensors.feedback, noise("feedback")), round(rates.control / sensors.feedback.rate)),
         ]
         self._usbl = Usbl(sensors.usbl, noise("usbl"), pose)
         self._channel = Channel(plan.acoustics, noise("acoustics"))
@@ -105,7 +106,7 @@ class Loop:
 
         start = plan.vehicle.start
         place = np.array(scenario.start_position(plan))
-        shaft = condense.steady_shaft_speed(believed.parameters, start.speed) if start.speed else 0.0
+        shaft = believed.shaft_speed_for(start.speed)
         self.world.place(place, math.radians(start.heading_deg), start.speed, shaft)
 
         self.ticks = 0

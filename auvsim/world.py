@@ -8,7 +8,7 @@ import numpy as np
 from dm_control import mjcf
 from pydantic import Field
 
-from auvsim import hydrodynamics, library
+from auvsim import hydrodynamics, library, scenery
 from auvsim.currents import CurrentField
 from auvsim.errors import DivergenceError, InputError
 from auvsim.fluid import WATER
@@ -24,10 +24,11 @@ class WorldSettings(Settings):
     """What surrounds the vehicle."""
 
     integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
-        "implicitfast", description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one"
+        default="implicitfast",
+        description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
     )
-    water_density: float = Field(hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
-    sea_floor: float = Field(40.0, gt=0, description="depth of the sea floor [m]")
+    water_density: float = Field(default=hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
+    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
 
 
 class Contact(NamedTuple):
@@ -43,58 +44,17 @@ def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settin
     Args:
         rate: physics steps per second [Hz].
     """
-    root = mjcf.RootElement(model="trial")
+    root: Any = mjcf.RootElement(model="trial")
     root.compiler.angle = "radian"
     root.size.nuser_body, root.size.nuserdata = RECORD, WATER
     root.option.timestep, root.option.integrator = 1.0 / rate, settings.integrator
     root.option.flag.autoreset = "disable"  # a diverging simulation must be seen, not restarted
-    root.visual.map.znear, root.visual.map.zfar = 0.002, 4.0
-    root.visual.quality.shadowsize = 0  # software drawing: shadows cost 200 ms a frame
-    getattr(root.visual, "global").offwidth, getattr(root.visual, "global").offheight = 1920, 1080
-    root.statistic.extent, root.statistic.center = 100.0, (0, 0, -pose.depth)
-    root.asset.add(
-        "texture",
-        name="sand",
-        type="2d",
-        builtin="checker",
-        rgb1=(0.62, 0.57, 0.45),
-        rgb2=(0.56, 0.51, 0.40),
-        width=256,
-        height=256,
-    )
-    root.asset.add("material", name="sand", texture="sand", texrepeat=(60, 60), specular=0, shininess=0)
-    root.asset.add(
-        "texture",
-        name="water",
-        type="skybox",
-        builtin="gradient",
-        rgb1=(0.12, 0.42, 0.55),
-        rgb2=(0.02, 0.12, 0.22),
-        width=64,
-        height=64,
-    )
-    root.worldbody.add(
-        "light",
-        name="sun",
-        directional=True,
-        pos=(0, 0, 0),
-        dir=(0.2, 0.1, -1),
-        diffuse=(0.8, 0.85, 0.9),
-        castshadow=False,
-    )
-    root.worldbody.add(
-        "geom", name="sea_floor", type="plane", size=(600, 600, 1), pos=(0, 0, -settings.sea_floor), material="sand"
-    )
+    scenery.furnish(root, settings.sea_floor, pose.depth)
     quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
     place = root.worldbody.add("site", name="dock", pos=(0, 0, -pose.depth), quat=quaternion, rgba=(0, 0, 0, 0))
     place.attach(dock.root)
-    if settings.sea_floor > pose.depth + 1.6:
-        x = dock.cone_length + 0.3
-        root.worldbody.add(
-            "geom", name="pillar", type="cylinder", size=(0.12,), contype=0, conaffinity=0, group=1, rgba=(0.35, 0.38, 0.42, 1),
-            fromto=(x * np.cos(pose.heading), -x * np.sin(pose.heading), -pose.depth - 1.6,
-                    x * np.cos(pose.heading), -x * np.sin(pose.heading), -settings.sea_floor),
-        )  # fmt: skip
+    ahead = np.array([np.cos(pose.heading), -np.sin(pose.heading)])
+    scenery.add_pillar(root, settings.sea_floor, pose.depth, (dock.cone_length + 0.3) * ahead)
     frame = root.worldbody.attach(vehicle.root)
     frame.add("freejoint")
     root.sensor.add(

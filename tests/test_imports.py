@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 LINES = """
     errors settings files yaml_text schema frames truth randomness interpolation currents forces layout fluid
-    hydrodynamics allocation library condense world planar_world acoustics sensors navigation guidance control
+    hydrodynamics allocation library condense scenery world planar_world acoustics sensors navigation guidance control
     scenario sampling netcdf log dock_frame recorder trial environment metrics drawing plots video export
     identification campaign reproduce cli
 """

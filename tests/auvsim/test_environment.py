@@ -47,5 +47,5 @@ def test_straight_ahead_docks_and_is_rewarded(plan):
         step = env.step((0.0, 0.0, shaft))
         total += step.reward
     assert step.discount == 0.0
-    # 12 m to the mouth, less the nose's 0.8 m, and 1.29 m to the latched place; the latch closes up to 0.15 m before it.
+    # 12 m less the nose, 0.8 m, and 1.29 m to the latched place; the latch closes up to 0.15 m before it.
     assert total == pytest.approx(100.0 + 12.0 - 0.8 + 1.29, abs=0.2)

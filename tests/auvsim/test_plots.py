@@ -2,16 +2,17 @@ import dataclasses
 import subprocess
 import sys
 from collections.abc import Callable
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 from synthetic import ATTRIBUTES, CURRENT, DOCK_HEADING, GO_AROUND, NOSE, empty_log, trial_log, truth, writer
 
 from auvsim.errors import InputError
+from auvsim.frames import rotation
 from auvsim.log import PHASES, TrialLog
 from auvsim.metrics import NEES_INTERVAL, estimate_errors, fixes
 from auvsim.plots import DPI, SIZE, estimates, estimates_figure, track, track_figure
@@ -23,24 +24,24 @@ def log() -> TrialLog:
 
 
 @pytest.fixture(scope="module")
-def way(log: TrialLog) -> Figure:
+def way(log: TrialLog) -> Any:
     figure = track_figure(log)
     figure.draw_without_rendering()
     return figure
 
 
 @pytest.fixture(scope="module")
-def errors(log: TrialLog) -> Figure:
+def errors(log: TrialLog) -> Any:
     figure = estimates_figure(log)
     figure.draw_without_rendering()
     return figure
 
 
-def panel(figure: Figure, title: str) -> Axes:
+def panel(figure: Any, title: str) -> Any:
     return next(axes for axes in figure.axes if axes.get_title().startswith(title))
 
 
-def labelled(axes: Axes, label: str) -> np.ndarray:
+def labelled(axes: Any, label: str) -> np.ndarray:
     """Points (n, 2) of the line with a label."""
     return next(line for line in axes.get_lines() if line.get_label() == label).get_xydata()
 
@@ -55,7 +56,7 @@ def test_png_of_the_announced_size(plot: Callable, make: Callable, tmp_path: Pat
     assert [entry.name for entry in tmp_path.iterdir()] == ["picture.png"]
 
 
-def test_plan_shows_truth_estimate_fixes_and_dock(log: TrialLog, way: Figure):
+def test_plan_shows_truth_estimate_fixes_and_dock(log: TrialLog, way: Any):
     plan = panel(way, "Plan view")
     east_north = log["truth"]["position"][:, 1::-1]
     np.testing.assert_array_equal(labelled(plan, "start"), east_north[:1])
@@ -74,7 +75,7 @@ def test_plan_shows_truth_estimate_fixes_and_dock(log: TrialLog, way: Figure):
     assert plan.get_aspect() == 1.0
 
 
-def test_the_track_is_coloured_by_phase_without_gaps(log: TrialLog, way: Figure):
+def test_the_track_is_coloured_by_phase_without_gaps(log: TrialLog, way: Any):
     plan = panel(way, "Plan view")
     names = [name.replace("_", " ") for name in PHASES]
     lines = [line for line in plan.get_lines() if line.get_label() in names]
@@ -84,12 +85,12 @@ def test_the_track_is_coloured_by_phase_without_gaps(log: TrialLog, way: Figure)
     pieces = [
         line.get_xydata() for line in plan.get_lines() if line.get_color() in colours and len(line.get_xydata()) > 1
     ]
-    for before, after in zip(pieces, pieces[1:], strict=False):
+    for before, after in pairwise(pieces):
         np.testing.assert_array_equal(before[-1], after[0])
     assert sum(len(piece) - 1 for piece in pieces) == len(log["truth"]["time"]) - 1
 
 
-def test_current_arrow_points_where_the_water_flows(way: Figure):
+def test_current_arrow_points_where_the_water_flows(way: Any):
     inset = panel(way, "Plan view").child_axes[0]
     arrow = inset.texts[0]
     east, north = np.subtract(arrow.xy, arrow.xyann)
@@ -97,28 +98,28 @@ def test_current_arrow_points_where_the_water_flows(way: Figure):
     assert inset.get_title() == "current 0.25 m/s to 323°"
 
 
-def test_zoom_shows_the_nose_and_the_funnel_to_scale(way: Figure):
+def test_zoom_shows_the_nose_and_the_funnel_to_scale(log: TrialLog, way: Any):
     zoom = panel(way, "The nose")
     assert zoom.get_xlim() == (-30.0, 4.0)
     assert zoom.get_ylim()[0] > 0.0 > zoom.get_ylim()[1]  # starboard below
     assert zoom.get_aspect() == 1.0
     outlines = [line.get_xydata() for line in zoom.get_lines() if len(line.get_xydata()) == 3]
-    starboard = [[0.0, 0.75], [1.03923, 0.15], [1.63923, 0.15]]
-    np.testing.assert_allclose(outlines, [np.multiply(starboard, [1.0, -1.0]), starboard], atol=1e-9)  # rounding
-    # The last waypoint of the body is 0.5 m before the mouth; the spline ends within one step, 0.15 m, of it.
-    assert max(line.get_xdata()[-1] for line in zoom.get_lines() if len(line.get_xdata()) > 99) == pytest.approx(
-        NOSE - 0.5, abs=0.16
-    )
+    starboard = np.array([[0.0, 0.75], [1.03923, 0.15], [1.63923, 0.15]])
+    np.testing.assert_allclose(outlines, np.stack([starboard * [1.0, -1.0], starboard]), atol=1e-9)  # rounding
+    attitude, body = log["truth"]["attitude"][-1], log["truth"]["position"][-1]
+    nose = rotation(0.0, 0.0, DOCK_HEADING).T @ (body + rotation(*attitude) @ [NOSE, 0.0, 0.0])
+    ends = np.array([line.get_xydata()[-1] for line in zoom.get_lines() if len(line.get_xydata()) > 99])
+    assert np.min(np.linalg.norm(ends - nose[:2], axis=1)) == pytest.approx(0.0, abs=1e-9)  # rounding
 
 
-def test_depth_is_drawn_downward_with_its_command(log: TrialLog, way: Figure):
+def test_depth_is_drawn_downward_with_its_command(log: TrialLog, way: Any):
     depth = panel(way, "Depth")
     low, high = depth.get_ylim()
     assert low > log["truth"]["position"][:, 2].max() > log["truth"]["position"][:, 2].min() > high
     np.testing.assert_array_equal(labelled(depth, "command")[:, 1], log["guidance"]["depth_command"])
 
 
-def test_error_panels_hold_errors_bands_and_ticks(log: TrialLog, errors: Figure):
+def test_error_panels_hold_errors_bands_and_ticks(log: TrialLog, errors: Any):
     expected = estimate_errors(log)
     seen = expected.initialised
     for title, error, sigma in (
@@ -131,12 +132,12 @@ def test_error_panels_hold_errors_bands_and_ticks(log: TrialLog, errors: Figure)
         band = axes.collections[0].get_paths()[0].vertices[:, 1]
         assert (band.min(), band.max()) == pytest.approx((-2.0 * sigma[seen].max(), 2.0 * sigma[seen].max()))
         low, high = axes.get_ylim()
-        assert low < error[seen].min() < error[seen].max() < high
+        assert np.mean((error[seen] > low) & (error[seen] < high)) >= 0.98  # single blows may leave the picture
         ticks = [len(collection.get_paths()) for collection in axes.collections[1:3]]
         assert ticks == [np.sum(~log["usbl"]["lost"]), 3]
 
 
-def test_nees_is_drawn_with_its_interval(log: TrialLog, errors: Figure):
+def test_nees_is_drawn_with_its_interval(log: TrialLog, errors: Any):
     axes = panel(errors, "NEES")
     curve = next(line for line in axes.get_lines() if len(line.get_xdata()) > 99)
     np.testing.assert_array_equal(curve.get_ydata(), estimate_errors(log).nees[estimate_errors(log).initialised])
@@ -145,9 +146,9 @@ def test_nees_is_drawn_with_its_interval(log: TrialLog, errors: Figure):
     assert pytest.approx((0.0506, 7.378), rel=1e-3) == NEES_INTERVAL  # chi-square table, 2 degrees of freedom
 
 
-def test_every_axis_has_its_unit_and_no_texts_overlap(way: Figure, errors: Figure):
+def test_every_axis_has_its_unit_and_no_texts_overlap(way: Any, errors: Any):
     for figure in (way, errors):
-        texts = [figure.get_suptitle() and figure._suptitle]
+        texts = list(figure.texts)
         for axes in figure.axes:
             assert "[" in axes.get_ylabel()
             texts += [axes.title, axes.xaxis.label, axes.yaxis.label]
@@ -175,7 +176,7 @@ def test_a_diverged_log_can_be_drawn(tmp_path: Path):
     assert "diverged" in track_figure(log).get_suptitle()
 
 
-def test_the_title_tells_the_outcome(log: TrialLog, way: Figure):
+def test_the_title_tells_the_outcome(log: TrialLog, way: Any):
     assert way.get_suptitle().startswith("Trial 0, seed 7: docked at 474.4 s, 2 attempts, nose 0.")
     other = dataclasses.replace(empty_log(), attributes={**empty_log().attributes, **ATTRIBUTES, "trial": 4})
     assert track_figure(other).get_suptitle() == "Trial 4, seed 7: not docked (interrupted), 0 attempts"

@@ -12,11 +12,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from auvsim import hydrodynamics
+from auvsim import hydrodynamics, library
 from auvsim.frames import Array
 
 DENSITY = 1026.0  # of the water [kg/m3]
 GRAVITY = 9.81
+RPM = np.pi / 30.0  # [rad/s]
 TURN = np.diag([1.0, -1.0, -1.0])  # NED to MuJoCo's world, and forward-starboard-down to forward-port-up
 TURN6 = np.kron(np.eye(2), TURN)
 
@@ -125,6 +126,31 @@ def free_body(
     if equip:
         hydrodynamics.equip(model, DENSITY)
     return model
+
+
+def remus100(
+    *, timestep: float = 0.01, integrator: str = "implicitfast", density: float = DENSITY, equip: bool = True
+) -> mujoco.MjModel:
+    """The shipped vehicle, free in open water."""
+    root = library.vehicle("remus100").root
+    root.find("body", "hull").add("freejoint")
+    root.option.timestep, root.option.integrator = timestep, integrator
+    model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    if equip:
+        hydrodynamics.equip(model, density)
+    return model
+
+
+def command(data: mujoco.MjData, rudder: float = 0.0, elevator: float = 0.0, rpm: float = 0.0, *, at_once=True) -> None:
+    """Sets the remus100's actuators; `at_once` puts fins and shaft there too, without their lags."""
+    angles = {"rudder_upper": rudder, "rudder_lower": rudder, "plane_port": elevator, "plane_starboard": elevator}
+    for name, angle in angles.items():
+        data.actuator(name).ctrl[0] = angle
+        if at_once:
+            data.joint(name).qpos[0] = angle
+    data.actuator("shaft").ctrl[0] = rpm * RPM
+    if at_once:
+        data.joint("shaft").qvel[0] = rpm * RPM
 
 
 def set_motion(

@@ -3,11 +3,10 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import TURN6, WHEEL, Rigid, acceleration, coriolis, dense, free_body, set_motion
+from physics.bodies import TURN6, WHEEL, Rigid, acceleration, coriolis, dense, free_body, remus100, set_motion
 from scipy.spatial.transform import Rotation
 
-from auvsim import library
-from auvsim.hydrodynamics import equip
+from auvsim import hydrodynamics
 
 RIGID = Rigid()
 ATTITUDE = Rotation.from_euler("ZYX", (0.8, -0.4, 1.1)).as_matrix()
@@ -76,7 +75,7 @@ def test_munk_moment_turns_a_drifting_body_broadside():
     for u, v, w in ((1.5, 0.2, 0.0), (1.5, -0.2, 0.0), (-1.5, 0.2, 0.0), (1.5, 0.0, 0.3), (0.4, 0.5, 0.6)):
         set_motion(model, data, [u, v, w, 0, 0, 0])
         moment = TURN6[3:, 3:] @ data.qfrc_passive[3:6]
-        munk = [(25.0 - 30.0) * v * w * -1.0, -(2.0 - 25.0) * u * w, -(30.0 - 2.0) * u * v]
+        munk = [-(25.0 - 30.0) * v * w, -(2.0 - 25.0) * w * u, -(30.0 - 2.0) * u * v]
         assert moment == pytest.approx(munk, abs=1e-12)  # a handful of products
     set_motion(model, data, [1.5, 0.2, 0, 0, 0, 0])
     assert data.qfrc_passive[5] > 0.0  # MuJoCo's z is up: the bow goes to port, the drift grows
@@ -84,16 +83,14 @@ def test_munk_moment_turns_a_drifting_body_broadside():
 
 
 @pytest.mark.parametrize("attitude", [np.eye(3), ATTITUDE], ids=["level", "tilted"])
-def test_remus100_in_its_scene_frame_gains_just_its_added_mass(attitude):
+def test_remus100_gains_just_its_added_mass(attitude):
     """The joint-space inertia of the whole tree with and without the callback differs by J' M_A J, and only at the base."""
-    root = library.vehicle("remus100").root
-    root.find("body", "hull").add("freejoint")
-    model = mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    model = remus100(equip=False)
     data = mujoco.MjData(model)
     dry, wet = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv))
     set_motion(model, data, np.zeros(6), attitude)
     mujoco.mj_fullM(model, data, dry)
-    equip(model)
+    hydrodynamics.equip(model)
     set_motion(model, data, np.zeros(6), attitude)
     mujoco.mj_fullM(model, data, wet)
     R = np.kron(np.diag([1.0, 0.0]), data.body("hull").xmat.reshape(3, 3)) + np.diag([0.0] * 3 + [1.0] * 3)
