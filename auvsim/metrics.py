@@ -77,8 +77,8 @@ class Summary:
     miss_distance: float | None  # first crossing of the last attempt that has one [m]
     heading_error_deg: float | None  # at that crossing [deg]
     crossings: tuple[Crossing, ...]
-    contact_impulse: float  # [N s]
-    peak_contact_force: float  # [N]
+    contact_impulse: float  # until the latch held; what the current then presses against the dock is no impact [N s]
+    peak_contact_force: float  # of the same contacts [N]
     estimate: dict[str, EstimateQuality]  # "all" before docking, and each phase that has estimates; once initialised
     fixes_sent: int
     fixes_lost: int
@@ -97,7 +97,8 @@ def summarise(log: TrialLog) -> Summary:
     last = next((c for c in passed if c.attempt == passed[-1].attempt), None)
     docked_at = _docking_time(log)
     reason, text = (None, None) if docked_at is not None else _failure(log)
-    contact, usbl = log["contact"], log["usbl"]
+    usbl, contact = log["usbl"], log["contact"]
+    entry = slice(None if docked_at is None else int(np.searchsorted(contact["time"], docked_at, side="right")))
     end, wall = _end(log), log.number(WALL_TIME)
     return Summary(
         status=str(log.attributes["status"]),
@@ -109,8 +110,8 @@ def summarise(log: TrialLog) -> Summary:
         miss_distance=last.miss_distance if last else None,
         heading_error_deg=last.heading_error_deg if last else None,
         crossings=passed,
-        contact_impulse=float(contact["impulse"][-1]) if len(contact["impulse"]) else 0.0,
-        peak_contact_force=float(contact["force"].max(initial=0.0)),
+        contact_impulse=float(contact["impulse"][entry].max(initial=0.0)),
+        peak_contact_force=float(contact["force"][entry].max(initial=0.0)),
         estimate=estimate_quality(estimate_errors(log)),
         fixes_sent=len(usbl["time"]),
         fixes_lost=int(usbl["lost"].sum()),

@@ -12,7 +12,7 @@ from estimators.planar_filter import COMPASS, USBL, DockingNoise, HeadingModel, 
 from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
 from estimators.types import Array, Gaussian, Measurement
 
-REMEMBERED = 4  # rejected fixes a new one is compared with
+REMEMBERED = 4  # rejected fixes that are kept; the next one then is taken in any case
 PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
 AGREEMENT = 0.99  # probability with which two good fixes are found to agree
 FORGOTTEN = 30.0  # age at which a rejected fix says nothing more of the present [s]
@@ -51,6 +51,9 @@ class AugmentedFilter:
 
     The gate widens while fixes are missing. So a fix that comes after a rejected one and is inside the gate, but
     outside its inner 95 %, is compared too: else a belief wrong by some metres would be mended by a wrong current.
+
+    Fixes far noisier than believed may never agree; so after four rejected in a row, whatever their age, the next one
+    is taken with the last of them.
 
     Args:
         parameters: The vehicle.
@@ -112,13 +115,15 @@ class AugmentedFilter:
             return AugmentedState(belief, state.outliers)
         H = self._position.jacobian(state.belief.mean)
         now = Rejected(fix.stamp, innovation.residual, H, fix.covariance)
-        recent = tuple(r for r in state.rejected if fix.stamp - r.stamp <= FORGOTTEN)[-REMEMBERED:]
+        recent = [r for r in state.rejected if fix.stamp - r.stamp <= FORGOTTEN]
         for earlier in reversed(recent):
             if self._agree(earlier, now):
                 return AugmentedState(self._recover(state.belief, earlier, now), state.outliers - 1)
         if innovation.accepted:
             return AugmentedState(belief, state.outliers)
-        return AugmentedState(state.belief, state.outliers + 1, (*recent, now))
+        if len(state.rejected) >= REMEMBERED:
+            return AugmentedState(self._recover(state.belief, state.rejected[-1], now), state.outliers)
+        return AugmentedState(state.belief, state.outliers + 1, (*state.rejected, now))
 
     def _agree(self, earlier: Rejected, now: Rejected) -> bool:
         """Whether an error of the current can explain how the innovation changed between two fixes."""

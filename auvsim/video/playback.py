@@ -74,7 +74,7 @@ class Playback:
         )
         scenery.paint_sea_floor(self.model)
         self.data = mujoco.MjData(self.model)
-        self.vehicle_name, self.mouth_radius = vehicle.name, dock.mouth_radius
+        self.vehicle_name, self.nose = vehicle.name, vehicle.nose
         self._address(vehicle)
         self._truth_columns()
         self._belief_columns()

@@ -1,0 +1,150 @@
+"""The video of a trial and a still picture, from its log alone, drawn without a window.
+
+Main view: from above where the trial is time-lapse, the dock where it is slow. Beside it the vehicle from behind and
+from above, the numbers of the moment and a legend.
+"""
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+
+import av
+import matplotlib.image
+import numpy as np
+
+from auvsim.errors import DrawingError, InputError
+from auvsim.files import whole
+from auvsim.log import TrialLog
+from auvsim.video.canvas import Picture
+from auvsim.video.playback import Playback
+from auvsim.video.stage import Stage
+from auvsim.video.storyboard import Frame, storyboard, verdict
+
+__all__ = ["DrawingError", "render", "still"]
+
+FPS = 25
+QUALITY = 27  # constant rate factor of x264
+WAITING = 8  # pictures drawn ahead of the encoder
+
+
+def render(
+    log: TrialLog,
+    path: str | os.PathLike[str],
+    *,
+    width: int = 1280,
+    height: int = 720,
+    fps: int = FPS,
+    speed: float | None = None,
+    cameras: Sequence[str] = (),
+    progress: Callable[[int, int], None] | None = None,
+) -> None:
+    """Writes the video of a trial (MP4, H.264), whole or not at all.
+
+    Args:
+        log: of any status.
+        path: of the video.
+        width: even [pixels].
+        height: even [pixels].
+        fps: pictures a second.
+        speed: speed-up far from the dock; by default such that the video lasts less than a minute.
+        cameras: up to three of overview, follow, above, dock: the main view and those beside it, throughout; by
+            default overview or dock, with follow and above beside them.
+        progress: called with the number of pictures done and in all.
+
+    Raises:
+        DrawingError: there is no OpenGL.
+        InputError: the log holds nothing to draw, there is no such camera, or the file cannot be written.
+    """
+    for name, value in (("width", width), ("height", height)):
+        if value % 2 or not 64 <= value <= 4096:
+            raise InputError(f"video: {name} {value}: needs an even number of pixels from 64 to 4096")
+    if speed is not None and not 1.0 <= speed <= 1000.0:
+        raise InputError(f"video: speed {speed}: needs a speed-up from 1 to 1000")
+    playback = Playback(log)
+    frames = storyboard(playback, fps, speed)
+    try:
+        with Stage(playback, width, height, cameras) as stage, whole(Path(path)) as partial:
+            pictures = (stage.picture(frame, 1.0 / fps) for frame in frames)
+            _encode(pictures, partial, (width, height), fps, progress, len(frames))
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def still(
+    log: TrialLog,
+    path: str | os.PathLike[str],
+    time: float | None = None,
+    *,
+    width: int = 1280,
+    height: int = 720,
+    cameras: Sequence[str] = (),
+) -> None:
+    """Writes one picture of a trial (PNG), with smooth edges, whole or not at all.
+
+    Args:
+        log: of any status.
+        path: of the picture.
+        time: of the trial [s]; by default when the nose is in the mouth of the dock, or else nearest to it.
+        width: [pixels].
+        height: [pixels].
+        cameras: as for `render`.
+
+    Raises:
+        DrawingError: there is no OpenGL.
+        InputError: the log holds nothing to draw, there is no such camera, or the file cannot be written.
+    """
+    playback = Playback(log)
+    if time is None:
+        time = float(playback.times[playback.ranges.argmin()])
+    near = bool(playback.at(time).range < 30.0)
+    frame = Frame(time=time, speed=0.0, near=near, banner=verdict(playback) if time >= playback.end else "")
+    try:
+        with Stage(playback, width, height, cameras, samples=4) as stage, whole(Path(path)) as partial:
+            _save_png(stage.picture(frame, 0.0), partial)
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _save_png(picture: Picture, path: Path) -> None:
+    matplotlib.image.imsave(path, np.ascontiguousarray(picture), format="png")
+
+
+def _encode(
+    pictures: Iterator[Picture],
+    path: Path,
+    size: tuple[int, int],
+    fps: int,
+    progress: Callable[[int, int], None] | None,
+    total: int,
+) -> None:
+    """Encodes in a thread while the next pictures are drawn."""
+    with _movie(path, size, fps) as encode, ThreadPoolExecutor(1) as thread:
+        pending: deque[Future] = deque()
+        for done, picture in enumerate(pictures, 1):
+            pending.append(thread.submit(encode, picture))
+            if len(pending) > WAITING:
+                pending.popleft().result()
+            if progress:
+                progress(done, total)
+        for future in pending:
+            future.result()
+
+
+@contextmanager
+def _movie(path: Path, size: tuple[int, int], fps: int) -> Iterator[Callable[[Picture], None]]:
+    """A function that appends a picture to the video."""
+    with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
+        stream = container.add_stream("libx264", rate=Fraction(fps), options={"crf": str(QUALITY), "preset": "veryfast"})
+        stream.width, stream.height = size
+        stream.pix_fmt = "yuv420p"
+
+        def encode(picture: Picture) -> None:
+            frame = av.VideoFrame.from_ndarray(np.ascontiguousarray(picture), format="rgb24")
+            container.mux(stream.encode(frame))
+
+        yield encode
+        container.mux(stream.encode(None))
