@@ -42,3 +42,9 @@ def test_version_is_the_same_everywhere() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     assert project["version"] == auvsim.__version__
     assert str(yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"]) == auvsim.__version__
+
+
+def test_the_printed_log_format_is_the_log_format():
+    from auvsim.log import table_markdown
+
+    assert (ROOT / "docs" / "log_format.md").read_text() == table_markdown() + "\n"
