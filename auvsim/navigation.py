@@ -10,6 +10,7 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -97,9 +98,8 @@ class DockingNavigator:
     gauge's, smoothed.
     """
 
-    def __init__(self, estimator: DockingEstimator, allocation: Allocation, compass_rate: float) -> None:
+    def __init__(self, estimator: DockingEstimator, allocation: Allocation) -> None:
         self._estimator, self._allocation = estimator, allocation
-        self._compass_period = 1.0 / compass_rate
         self.reset()
 
     def reset(self) -> None:
@@ -118,7 +118,7 @@ class DockingNavigator:
                 headings.append(float(reading.value[0]))
                 stamps.append(reading.stamp)
             elif reading.sensor == "feedback":
-                drives.append(reading.value)
+                drives.append(reading.value.tolist())
             elif reading.sensor == "depth":
                 self._smooth_depth(reading.stamp, float(reading.value[0]))
             elif reading.sensor == "usbl":
@@ -136,8 +136,8 @@ class DockingNavigator:
                 )
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
-            drive = np.mean(drives, axis=0).tolist()
-            rudder, shaft_speed = self._allocation.effective(drive[:-1])[0], drive[-1]
+            *fins, shaft_speed = (sum(values) / len(drives) for values in zip(*drives, strict=True))
+            rudder, _ = self._allocation.effective(fins)
         result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
         mean = result.mean
         self._yaw_rate = float(mean[5])
@@ -186,9 +186,13 @@ def _docking(
     model = UsblModel(transceiver=usbl.transceiver, dock_heading=math.radians(settings.dock_heading_deg))
     filter_ = kind(parameters, noise, transponder=usbl.transponder[:2])
     estimator = DockingEstimator(filter_, model, step=step)
-    return DockingNavigator(
-        estimator, library.vehicle(scenario.vehicle.model).allocation, scenario.sensors.compass.rate
-    )
+    return DockingNavigator(estimator, _allocation(scenario.vehicle.model))
+
+
+@cache
+def _allocation(model: str) -> Allocation:
+    """The fin map of a vehicle; kept, because to load the vehicle takes as long as half a minute of a trial."""
+    return library.vehicle(model).allocation
 
 
 def augmented_ekf(parameters: PlanarParameters, scenario: Any) -> Navigator:

@@ -3,6 +3,7 @@
 import importlib.metadata
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -105,5 +106,6 @@ class LogWriter:
         return (rows, *(self._sizes[dimension] for dimension in variable.dimensions))
 
 
+@cache  # reading a package's metadata takes milliseconds
 def _version(package: str) -> str:
     return auvsim.__version__ if package == "auvsim" else importlib.metadata.version(package)

@@ -11,6 +11,8 @@ WATER = (0.07, 0.27, 0.36)  # colour into which everything fades [rgb]
 TILE = 100.0  # side of the square after which the sea floor's pattern repeats [m]
 PIXELS = 512  # of the pattern along that side
 HALF_WIDTH = 1500.0  # of the sea floor [m]
+EXTENT = 100.0  # of the scene, the unit of MuJoCo's distances [m]
+MURK = (4.0, 65.0)  # distances at which the water begins to hide things and hides all [m]
 PILLAR_TOP = 1.6  # below the dock's axis [m]
 METAL = (0.35, 0.38, 0.42, 1.0)
 
@@ -24,10 +26,11 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
         dock_depth: depth of the dock's mouth, round which the scene is centred [m].
     """
     root.visual.map.znear, root.visual.map.zfar = 0.002, 30.0  # of the extent
+    root.visual.map.fogstart, root.visual.map.fogend = (distance / EXTENT for distance in MURK)
     root.visual.quality.shadowsize = 0  # software drawing: shadows cost 200 ms a frame
     whole = getattr(root.visual, "global")
     whole.offwidth, whole.offheight = 1920, 1080
-    root.statistic.extent, root.statistic.center = 100.0, (0, 0, -dock_depth)
+    root.statistic.extent, root.statistic.center = EXTENT, (0, 0, -dock_depth)
     root.visual.headlight.ambient, root.visual.headlight.diffuse = (0.38, 0.42, 0.44), (0.25, 0.27, 0.28)
     root.visual.headlight.specular = (0.1, 0.1, 0.1)
     root.visual.rgba.fog = root.visual.rgba.haze = (*WATER, 1.0)
@@ -36,8 +39,8 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
         name="sand",
         type="2d",
         builtin="checker",
-        rgb1=(0.60, 0.57, 0.46),
-        rgb2=(0.52, 0.50, 0.41),
+        rgb1=(0.50, 0.53, 0.46),
+        rgb2=(0.42, 0.46, 0.41),
         width=PIXELS,
         height=PIXELS,
     )
@@ -48,8 +51,8 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
         name="water",
         type="skybox",
         builtin="gradient",
-        rgb1=(0.16, 0.50, 0.60),  # above, towards the surface
-        rgb2=(0.02, 0.12, 0.17),
+        rgb1=(0.12, 0.40, 0.50),  # above, towards the surface
+        rgb2=(0.02, 0.14, 0.22),
         width=64,
         height=64,
     )
@@ -103,6 +106,6 @@ def paint_sea_floor(model: mujoco.MjModel) -> None:
     pattern = model.tex_data[at : at + 3 * PIXELS * PIXELS].reshape(PIXELS, PIXELS, 3)
     generator = np.random.default_rng(0)
     grain = np.zeros((PIXELS, PIXELS))
-    for cells in (64, 128, 256, 512):  # value noise, octave by octave, down to a pixel
+    for cells in (128, 256, 512):  # value noise, octave by octave, down to a pixel
         grain += np.kron(generator.standard_normal((cells, cells)), np.ones((PIXELS // cells, PIXELS // cells)))
-    pattern[:] = np.clip(pattern * (1.0 + 0.05 * grain[:, :, np.newaxis]), 0, 255).astype(np.uint8)
+    pattern[:] = np.clip(pattern * (1.0 + 0.045 * grain[:, :, np.newaxis]), 0, 255).astype(np.uint8)

@@ -12,7 +12,6 @@ from typing import Annotated
 import tyro
 
 from auvsim import __version__
-from auvsim.cli.renderer import choose_renderer
 from auvsim.errors import AuvsimError, InputError
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
@@ -99,7 +98,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
-    choose_renderer()
     values: dict = {}
     if arguments and arguments[0] in TAKE_SCENARIO_KEYS and not {"-h", "--help"} & set(arguments):
         from auvsim.cli import options

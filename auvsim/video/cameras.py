@@ -30,7 +30,9 @@ class Cameras:
         self._playback = playback
         self._axis_azimuth = -math.degrees(playback.pose.heading)
         self._azimuth: float | None = None
-        self.overview_distance, self._overview = _overview(playback, aspect)
+        self._tangents = MARGIN * math.tan(math.radians(FIELD / 2.0)) * np.array([aspect, 1.0])
+        self._overview = _overview(playback, self._tangents)
+        self.overview_distance = float(self._overview.distance)
         self._aims: dict[str, Callable[[Moment, float], mujoco.MjvCamera]] = {
             "overview": lambda moment, step: self._overview,
             "follow": self._follow,
@@ -66,15 +68,16 @@ class Cameras:
         spread = 0.0
         if moment.belief is not None:
             spread = float(np.linalg.norm((moment.belief.position - moment.position)[:2]))
-        return _camera(moment.position, 8.0 + min(3.0 * spread, 60.0), self._axis_azimuth, -89.5)
+        return _camera(moment.position, 8.0 + min(3.0 * spread, 30.0), self._axis_azimuth, -89.5)
 
     def _dock(self, moment: Moment, step: float) -> mujoco.MjvCamera:
         """Obliquely from the dock's starboard side, nose and mouth in the picture."""
-        mouth = self._playback.mouth + 0.5 * self._playback.axis
+        mouth = self._playback.mouth
         away = moment.position - mouth
-        apart = float(np.linalg.norm(away))
-        shown = away * min(1.0, 30.0 / max(apart, 1e-9))
-        return _camera(mouth + 0.5 * shown, 3.4 + 0.8 * min(apart, 30.0), self._axis_azimuth + 58.0, -20.0)
+        away *= min(1.0, 30.0 / max(float(np.linalg.norm(away)), 1e-9))
+        dock = mouth + np.array([[0.0, 0.0, 1.1], [0.0, 0.0, -1.6], 1.7 * self._playback.axis])
+        vehicle = mouth + away + np.outer((-1.0, 1.0), moment.nose - moment.position)
+        return _fitted(np.concatenate([dock, vehicle]), self._axis_azimuth + 58.0, -20.0, self._tangents)
 
 
 def _camera(target: Array, distance: float, azimuth: float, elevation: float) -> mujoco.MjvCamera:
@@ -83,31 +86,36 @@ def _camera(target: Array, distance: float, azimuth: float, elevation: float) ->
     return camera
 
 
-def _overview(playback: Playback, aspect: float) -> tuple[float, mujoco.MjvCamera]:
-    """The distance and camera from which the whole track and the dock fill the picture best, of all azimuths."""
+def _overview(playback: Playback, tangents: Array) -> mujoco.MjvCamera:
+    """The camera from which the whole track and the dock fill the picture best, of all azimuths."""
     around = playback.mouth + 15.0 * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
     points = np.concatenate([playback.positions, around])
-    centre = points.mean(axis=0)
-    half = math.tan(math.radians(FIELD / 2.0))
-    tangents = MARGIN * half * np.array([aspect, 1.0])
-    # Of equally good ones that along which north points most upwards: azimuth 0 looks north.
-    fits = [(*_fit(points - centre, azimuth, tangents), azimuth) for azimuth in (0, -30, 30, -60, 60, -90, 90, 180)]
-    distance, shift, azimuth = min(fits, key=lambda fit: fit[0] * (1.0 + 0.0005 * abs(fit[2])))
-    return distance, _camera(centre + shift, distance, azimuth, TILT)
+    # Of nearly equal ones the one in which north points most upwards: azimuth 0 looks north.
+    fits = [_fitted(points, azimuth, TILT, tangents) for azimuth in range(-180, 180, 15)]
+    return min(fits, key=lambda camera: camera.distance * (1.0 + 0.0005 * abs(camera.azimuth)))
 
 
-def _fit(points: Array, azimuth: float, tangents: Array) -> tuple[float, Array]:
-    """Least distance from which all points are seen, and where to look.
+def _fitted(points: Array, azimuth: float, elevation: float, tangents: Array) -> mujoco.MjvCamera:
+    """The camera that sees all points (n, 3) from the least distance.
 
     A point with right and up `s` and depth `z` is seen from distance d, shifted by c, if |s - c| <= tangent (d + z).
+
+    Args:
+        points: to be seen [m].
+        azimuth: of the view [deg].
+        elevation: of the view [deg].
+        tangents: (2,) of the half angles of the view that the points may fill.
     """
-    right, up, forward = _axes(math.radians(azimuth), math.radians(TILT))
+    right, up, forward = _axes(math.radians(azimuth), math.radians(elevation))
+    centre = points.mean(axis=0)
+    points = points - centre
     depth = points @ forward
     sides = np.stack([points @ right, points @ up], axis=1)
     high = (sides - np.outer(depth, tangents)).max(axis=0)
     low = (-sides - np.outer(depth, tangents)).max(axis=0)
     shift = 0.5 * (high - low)
-    return float((0.5 * (high + low) / tangents).max()), shift[0] * right + shift[1] * up
+    distance = float((0.5 * (high + low) / tangents).max())
+    return _camera(centre + shift[0] * right + shift[1] * up, distance, azimuth, elevation)
 
 
 def _axes(azimuth: float, elevation: float) -> tuple[Array, Array, Array]:

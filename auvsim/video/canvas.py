@@ -53,16 +53,9 @@ class Canvas:
             reason = " ".join(str(error).split())[:120].rstrip(".")
             raise DrawingError(NO_OPENGL.format(reason or type(error).__name__)) from None
 
-    def draw(self, scene: mujoco.MjvScene, box: Box, fog: tuple[float, float]) -> None:
-        """Draws a scene into a rectangle.
-
-        Args:
-            scene: what is there, with its camera.
-            box: where in the picture.
-            fog: distances at which the water begins to hide things and hides all [m].
-        """
+    def draw(self, scene: mujoco.MjvScene, box: Box) -> None:
+        """Draws a scene, with its camera, into a rectangle."""
         assert self._context, "closed"
-        self._context.fogStart, self._context.fogEnd = fog
         viewport = mujoco.MjrRect(box.x, self.height - box.y - box.height, box.width, box.height)
         mujoco.mjr_render(viewport, scene, self._context)
 

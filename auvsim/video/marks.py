@@ -19,10 +19,12 @@ FIX: Colour = (0.95, 0.97, 1.0, 1.0)
 REFUSED: Colour = (1.0, 0.15, 0.1, 1.0)
 CURRENT: Colour = (0.45, 0.95, 1.0, 1.0)
 DOCK: Colour = (1.0, 0.55, 0.2, 1.0)
+FLOOR: Colour = (0.32, 0.62, 0.72, 1.0)  # in the overview
 MOTE: Colour = (0.75, 0.92, 0.92, 1.0)
 
 SIGMAS = 2.0  # of the ellipse round the estimate
 MOTES, MOTE_CUBE = 90, 11.0  # specks in the water round the vehicle, and the side of the cube they fill [m]
+ARROW_TIME = 7.0  # [s]
 STILL_WATER = 0.01  # slower water has no arrows [m/s]
 UPRIGHT = np.eye(3).ravel()
 _NOTHING = np.zeros(3)
@@ -45,18 +47,26 @@ class Mark(NamedTuple):
 class Layer:
     """A MuJoCo scene: its bodies, then marks that stay and grow in number, then marks of the moment."""
 
-    def __init__(self, playback: Playback, marks: Sequence[Mark], moving: int, bodies: int) -> None:
-        """Makes room for `marks` and `moving` marks of the moment; `bodies` are the categories drawn (mjtCatBit)."""
-        self._model, self._data, self._bodies = playback.model, playback.data, bodies
+    def __init__(self, playback: Playback, marks: Sequence[Mark], moving: int, *, overview: bool) -> None:
+        """Makes room for `marks` and `moving` marks of the moment; an overview has clear water and no vehicle."""
+        self._model, self._data = playback.model, playback.data
+        self._bodies = mujoco.mjtCatBit.mjCAT_STATIC if overview else mujoco.mjtCatBit.mjCAT_ALL
         self._option = mujoco.MjvOption()
         self._marks = sorted(marks, key=lambda mark: mark.time)
         self.scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + len(marks) + moving + 50)
         self._geoms = self.scene.geoms
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self.scene.flags[flag] = 0
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = 1
+        self.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = int(not overview)
         self._kept = 0
+        self._moves = not overview
         self._update()
+        self._count = self.scene.ngeom
+        if overview:  # through so much water the sea floor is dark and blue
+            floor = self._model.geom("sea_floor").id
+            for geom in self._geoms[: self._count]:
+                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == floor:
+                    geom.rgba = FLOOR
 
     def _update(self) -> None:
         camera = mujoco.MjvCamera()
@@ -64,9 +74,9 @@ class Layer:
 
     def begin(self, time: float) -> None:
         """Moves the bodies to where the model is and keeps the marks up to that time; it never goes back."""
-        self._update()
-        base = self.scene.ngeom
-        kept, self.scene.ngeom = self._kept, base + self._kept
+        if self._moves:
+            self._update()
+        kept, self.scene.ngeom = self._kept, self._count + self._kept
         while kept < len(self._marks) and self._marks[kept].time <= time:
             mark = self._marks[kept]
             self.join(mark.kind, mark.width, mark.start, mark.end, mark.colour)
@@ -152,7 +162,7 @@ class NearMarks:
     def __init__(self, playback: Playback) -> None:
         self._tracks = Tracks.of(playback, 0.6, 0.05)
         marks = self._tracks.marks + _axis(playback, 1.0, 40.0)
-        self.layer = Layer(playback, marks, MOTES + 40, mujoco.mjtCatBit.mjCAT_ALL)
+        self.layer = Layer(playback, marks, MOTES + 40, overview=False)
         self._motes = np.random.default_rng(0).uniform(0.0, MOTE_CUBE, (MOTES, 3))
         self._length = 2.0 * playback.nose
 
@@ -171,13 +181,13 @@ class NearMarks:
             self._specks(moment)
 
     def _arrows(self, moment: Moment) -> None:
-        """Arrows round the vehicle that show where the water flows, 4 s long."""
-        flow = 4.0 * moment.current
+        """Arrows round the vehicle that show where the water flows, each as far as it flows in ARROW_TIME."""
+        flow = ARROW_TIME * moment.current
         side = np.array([-flow[1], flow[0], 0.0]) / max(float(np.linalg.norm(flow[:2])), 1e-9)
         for across in (-2.2, 2.2):
             for along in (-1.0, 1.0):
                 start = moment.position + across * side + along * 2.4 * _unit(flow) - 0.5 * flow + [0.0, 0.0, -0.25]
-                self.layer.join(ARROW, 0.035, start, start + flow, CURRENT)
+                self.layer.join(ARROW, 0.022, start, start + flow, CURRENT)
 
     def _specks(self, moment: Moment) -> None:
         corner = moment.position - 0.5 * MOTE_CUBE
@@ -193,9 +203,9 @@ class FarMarks:
     def __init__(self, playback: Playback, distance: float) -> None:
         self.unit = unit = 0.01 * distance
         self._tracks = Tracks.of(playback, 0.35 * unit, 0.22 * unit)
-        self.dock_label = playback.mouth + np.array([0.0, 0.0, 3.2 * unit])
+        self.above = np.array([0.0, 0.0, 3.4 * unit])  # from a symbol to its name
         marks = self._tracks.marks + _funnel(playback, unit) + _axis(playback, 1.6 * unit, playback.plan.guidance.gate_distance)
-        self.layer = Layer(playback, marks, 100, mujoco.mjtCatBit.mjCAT_STATIC)
+        self.layer = Layer(playback, marks, 100, overview=True)
         self._floor = playback.model.geom("sea_floor").pos[2]
         low, high = playback.positions[:, :2].min(axis=0), playback.positions[:, :2].max(axis=0)
         low, high = np.minimum(low, 0.0) - 6.0 * unit, np.maximum(high, 0.0) + 6.0 * unit
@@ -214,11 +224,13 @@ class FarMarks:
         if moment.belief is not None:
             _ellipse(layer, moment.belief, 0.02 * unit)
             layer.ball((0.5 * unit,) * 3, moment.belief.position, np.eye(3), ESTIMATE)
-        layer.join(ARROW, 0.55 * unit, moment.position - 2.2 * unit * forward, moment.position + 2.2 * unit * forward, TRUE)
+        layer.join(ARROW, 0.6 * unit, moment.position - 3.5 * unit * forward, moment.position + 3.5 * unit * forward, TRUE)
         if float(np.linalg.norm(moment.current)) > STILL_WATER:
-            flow = 15.0 * unit * moment.current
+            speed = float(np.linalg.norm(moment.current))
+            length = min(30.0 * speed, 11.0) * unit  # no longer than to the next arrow
+            flow = length * moment.current / speed
             for station in self._stations:
-                layer.join(ARROW, 0.16 * unit, station - 0.5 * flow, station + 0.5 * flow, (*CURRENT[:3], 0.75))
+                layer.join(ARROW, min(0.14 * unit, 0.08 * length), station - 0.5 * flow, station + 0.5 * flow, (*CURRENT[:3], 0.75))
 
 
 def _ellipse(layer: Layer, belief: Belief, thickness: float) -> None:

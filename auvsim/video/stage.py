@@ -88,12 +88,10 @@ class Stage:
         camera = self._cameras.aim(name, moment, step)
         marks = self._far if name == "overview" else self._near
         mujoco.mjv_updateCamera(self._playback.model, self._playback.data, camera, marks.layer.scene)
-        reach = camera.distance
-        fog = (1.5 * reach, 8.0 * reach) if name == "overview" else (0.7 * reach + 3.0, 1.5 * reach + 45.0)
-        self._canvas.draw(marks.layer.scene, box, fog)
+        self._canvas.draw(marks.layer.scene, box)
         if name == "overview":
-            places["AUV"] = project(marks.layer.scene, moment.position, box)
-            places["dock"] = project(marks.layer.scene, self._far.dock_label, box)
+            places["AUV"] = project(marks.layer.scene, moment.position + self._far.above, box)
+            places["dock"] = project(marks.layer.scene, self._playback.mouth + self._far.above, box)
 
     def _write(
         self,

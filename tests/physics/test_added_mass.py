@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import TURN6, WHEEL, Rigid, acceleration, coriolis, dense, free_body, remus100, set_motion
+from bodies import TURN6, WHEEL, Rigid, acceleration, coriolis, dense, free_body, remus100, set_motion
 from scipy.spatial.transform import Rotation
 
 from auvsim import hydrodynamics

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, GRAVITY, RPM, TURN6, Rigid, command, free_body, motion, remus100, set_motion
+from bodies import DENSITY, GRAVITY, RPM, TURN6, Rigid, command, free_body, motion, remus100, set_motion
 from scipy.spatial.transform import Rotation
 
 ZG = 0.02  # the remus100's centre of gravity below its centre of buoyancy [m], as published

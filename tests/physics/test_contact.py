@@ -7,7 +7,7 @@ inertia I + b. Its Kirchhoff terms are then that body's gyroscopic terms, so the
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, WHEEL, Rigid, free_body, motion, set_motion
+from bodies import DENSITY, WHEEL, Rigid, free_body, motion, set_motion
 from scipy.spatial.transform import Rotation
 
 from auvsim import hydrodynamics

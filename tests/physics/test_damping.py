@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, body_force, command, dense, free_body, remus100, set_motion, set_water
+from bodies import DENSITY, body_force, command, dense, free_body, remus100, set_motion, set_water
 
 NONE = np.zeros((6, 6))
 SPEEDS = np.array([3.0, 1.5, 1.5, 2.0, 1.5, 1.5])  # more than the vehicle ever does

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, TURN, Rigid, body_force, command, free_body, remus100, set_motion, set_water
+from bodies import DENSITY, TURN, Rigid, body_force, command, free_body, remus100, set_motion, set_water
 
 AREA, SLOPE, STALL = 0.01, 3.0, 0.35
 COEFFICIENTS = {"area": AREA, "lift_slope": SLOPE, "stall_angle": STALL, "astern_lift": 0.7}

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import (
+from bodies import (
     DENSITY,
     WHEEL,
     Rigid,

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import Rigid, command, dense, free_body, motion, remus100, set_motion, solve_motion
+from bodies import Rigid, command, dense, free_body, motion, remus100, set_motion, solve_motion
 from scipy.spatial.transform import Rotation
 
 RIGID = Rigid()

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import Rigid, dense, free_body, motion, set_motion, solve_motion
+from bodies import Rigid, dense, free_body, motion, set_motion, solve_motion
 from scipy.spatial.transform import Rotation
 
 RIGID = Rigid()

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, RPM, body_force, command, motion, remus100, set_motion, set_water
+from bodies import DENSITY, RPM, body_force, command, motion, remus100, set_motion, set_water
 from scipy.spatial.transform import Rotation
 
 D, W, T, SWIRL = 0.14, 0.056, 0.1, 0.9

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 import pytest
-from physics.bodies import DENSITY, WHEEL, Rigid, acceleration, free_body, motion, set_motion, set_water
+from bodies import DENSITY, WHEEL, Rigid, acceleration, free_body, motion, set_motion, set_water
 
 MASS, ADDED = 12.5, 20.0  # with the wheel
 SPHERE = np.diag([ADDED, ADDED, ADDED, 0.5, 0.5, 0.5])
