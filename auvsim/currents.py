@@ -43,6 +43,17 @@ class CurrentField(Protocol):
         """The water at a time [s] and a position (3,) in NED [m]."""
         ...
 
+    def approach(self, attempt: int, distance: float, time: float) -> None:
+        """Tells that the vehicle, on the approach of an attempt, is that far [m] from the dock; most do not care."""
+        ...
+
+
+class _Indifferent:
+    """A field that does not depend on what the vehicle does."""
+
+    def approach(self, attempt: int, distance: float, time: float) -> None:
+        """Changes nothing."""
+
 
 class NoneSettings(Settings):
     """Still water."""
@@ -74,6 +85,18 @@ class TurningSettings(Settings):
         if self.end <= self.start:
             raise ValueError(f"the turn ends at {self.end} s, which must be after its start at {self.start} s")
         return self
+
+
+class ApproachTurnSettings(Settings):
+    """A uniform current that turns once in every docking attempt, somewhere on its approach: the hard case."""
+
+    kind: Literal["approach_turn"] = "approach_turn"
+    speed: float = Field(default=0.5, ge=0.0, description="horizontal speed [m/s]")
+    direction_deg: float = Field(
+        default=0.0, description="direction it flows to before the first turn, from north [deg]"
+    )
+    angle_deg: float = Field(default=90.0, gt=0.0, description="angle of each turn, to a side drawn at random [deg]")
+    duration: float = Field(default=10.0, gt=0.0, description="time that a turn takes [s]")
 
 
 class ShearPoint(Settings):
@@ -125,7 +148,13 @@ class SumSettings(Settings):
 
 
 CurrentSettings = Annotated[
-    NoneSettings | UniformSettings | TurningSettings | ShearSettings | GustSettings | SumSettings,
+    NoneSettings
+    | UniformSettings
+    | TurningSettings
+    | ApproachTurnSettings
+    | ShearSettings
+    | GustSettings
+    | SumSettings,
     Field(discriminator="kind"),
 ]
 SumSettings.model_rebuild()
@@ -135,7 +164,7 @@ _ZERO.setflags(write=False)
 _ZERO_GRADIENT.setflags(write=False)
 
 
-class Uniform:
+class Uniform(_Indifferent):
     """The same water at all times and places."""
 
     steady_uniform = True
@@ -150,7 +179,7 @@ class Uniform:
         return self._water
 
 
-class Turning:
+class Turning(_Indifferent):
     """A uniform current that turns at a constant rate during an interval.
 
     The derivative jumps at both ends of the turn; there it is the one that follows.
@@ -174,7 +203,43 @@ class Turning:
         return Water(velocity=np.array((north, east, 0.0)), derivative=derivative, gradient=_ZERO_GRADIENT)
 
 
-class Shear:
+_MOST_TURNS = 20  # attempts for which turns are drawn
+
+
+class ApproachTurn:
+    """A uniform current that starts to turn at a drawn share of the length of an attempt's approach."""
+
+    steady_uniform = False
+
+    def __init__(self, settings: ApproachTurnSettings, generator: Generator) -> None:
+        self._speed, self._duration = settings.speed, settings.duration
+        self._direction = math.radians(settings.direction_deg)
+        self._shares = generator.uniform(0.0, 1.0, _MOST_TURNS).tolist()
+        signs = generator.choice([-1.0, 1.0], _MOST_TURNS).tolist()
+        self._rates = [sign * math.radians(settings.angle_deg) / settings.duration for sign in signs]
+        self._lengths: dict[int, float] = {}  # distance at which an attempt's approach began [m]
+        self._turns: dict[int, tuple[float, float]] = {}  # start [s] and rate [rad/s] of the turn of an attempt
+
+    def approach(self, attempt: int, distance: float, time: float) -> None:
+        """Starts the turn of an attempt (from 1) when it is due."""
+        length = self._lengths.setdefault(attempt, distance)
+        index = (attempt - 1) % _MOST_TURNS
+        if attempt not in self._turns and distance <= self._shares[index] * length:
+            self._turns[attempt] = (time, self._rates[index])
+
+    def evaluate(self, time: float, position: Array) -> Water:
+        """The water at a time [s], the same everywhere."""
+        direction, rate = self._direction, 0.0
+        for start, turn in self._turns.values():
+            elapsed = min(max(time - start, 0.0), self._duration)
+            direction += turn * elapsed
+            rate += turn if 0.0 <= time - start < self._duration else 0.0
+        north, east = self._speed * math.cos(direction), self._speed * math.sin(direction)
+        derivative = np.array((-rate * east, rate * north, 0.0))
+        return Water(velocity=np.array((north, east, 0.0)), derivative=derivative, gradient=_ZERO_GRADIENT)
+
+
+class Shear(_Indifferent):
     """A steady current interpolated in depth."""
 
     steady_uniform = False
@@ -210,7 +275,7 @@ GUST_CORRELATION = 2.146193220620583
 _GUST_STEP = 0.1
 
 
-class Gust:
+class Gust(_Indifferent):
     """One realisation of the second-order Gauss-Markov process, drawn for a whole trial.
 
     x'' + 2 beta x' + beta^2 x = 2 sigma beta^(3/2) w, with autocorrelation sigma^2 (1 + beta |t|) exp(-beta |t|)
@@ -260,6 +325,11 @@ class Sum:
         self._terms = tuple(terms)
         self.steady_uniform = all(term.steady_uniform for term in terms)
 
+    def approach(self, attempt: int, distance: float, time: float) -> None:
+        """Tells every term."""
+        for term in self._terms:
+            term.approach(attempt, distance, time)
+
     def evaluate(self, time: float, position: Array) -> Water:
         """The sum of the terms at a time [s] and a position (3,) in NED [m]."""
         velocity, derivative, gradient = _ZERO, _ZERO, _ZERO_GRADIENT
@@ -284,6 +354,8 @@ def build_current(settings: CurrentSettings, generator: Generator, duration: flo
             return Uniform([*_horizontal(settings.speed, settings.direction_deg), settings.down])
         case TurningSettings():
             return Turning(settings)
+        case ApproachTurnSettings():
+            return ApproachTurn(settings, generator)
         case ShearSettings():
             return Shear(settings)
         case GustSettings():

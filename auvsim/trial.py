@@ -12,7 +12,7 @@ from auvsim.acoustics import Channel
 from auvsim.control import Autopilot
 from auvsim.currents import build_current
 from auvsim.errors import DivergenceError
-from auvsim.guidance import Geometry, Guidance
+from auvsim.guidance import Geometry, Guidance, Phase
 from auvsim.log import TrialLog
 from auvsim.navigation import Commands, Estimate, Navigator
 from auvsim.randomness import stream
@@ -81,8 +81,8 @@ class Loop:
         def noise(sensor: str) -> np.random.Generator:
             return stream(seed, trial, f"{name}/{sensor}")
 
-        current = build_current(plan.current, noise("current"), plan.duration + 1.0)
-        self.world = World.build(vehicle, dock, pose, current, plan.world, rates.physics)
+        self.current = build_current(plan.current, noise("current"), plan.duration + 1.0)
+        self.world = World.build(vehicle, dock, pose, self.current, plan.world, rates.physics)
         believed = condense.condense(plan.vehicle.model, plan.estimator.model_speed, plan.world.water_density)
         self.navigator: Navigator = navigation.build(plan.estimator.factory, believed.parameters, plan)
         self.guidance = Guidance(
@@ -165,10 +165,12 @@ class Loop:
 
     def _act(self) -> None:
         guidance, autopilot, time = self.guidance, self.autopilot, self.time
-        attitude = self._truth.attitude
-        heading = autopilot.heading if autopilot.heading is not None else float(attitude[2])
-        depth = autopilot.depth if autopilot.depth is not None else float(self._truth.position[2])
+        heading, depth = autopilot.heading, autopilot.depth
+        if heading is None or depth is None:  # nothing measured yet: go on as started
+            return
         wanted = guidance.update(time, self._estimate, heading, depth, self.world.latched)
+        if guidance.phase in (Phase.APPROACH, Phase.FINAL):
+            self.current.approach(guidance.attempt, float(np.hypot(*self._truth.position[:2])), time)
         self._commands = autopilot.command(*wanted)
         self.world.command(*self._commands)
         self.log.append("guidance", (time, guidance.phase, guidance.attempt, *wanted, guidance.along, guidance.cross))

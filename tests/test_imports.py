@@ -42,7 +42,7 @@ def violations(module: str, source: str) -> list[str]:
             before = ORDER.index(part) <= ORDER.index(name)
             allowed = before or imported.startswith("auvsim.sensors.reading.")  # a plain value, known to all
         else:
-            # The package itself holds its version, chooses the renderer, and nothing else that could be imported.
+            # The package itself holds its version, chooses the renderer, and nothing else to import.
             allowed = root != "auvsim" or imported in (
                 "auvsim",
                 "auvsim.__version__",

@@ -9,7 +9,7 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.linalg import expm
 from scipy.stats import chi2
 
-from auvsim.currents import GUST_CORRELATION, CurrentSettings, GustSettings, build_current
+from auvsim.currents import GUST_CORRELATION, ApproachTurnSettings, CurrentSettings, GustSettings, build_current
 from auvsim.errors import InputError
 from auvsim.randomness import stream
 
@@ -218,3 +218,43 @@ def test_sum_adds_and_a_term_does_not_change_the_noise_of_another():
 def test_bad_settings_are_refused(data, text):
     with pytest.raises(ValidationError, match=text):
         field(data)
+
+
+def test_approach_turn_turns_once_an_attempt_where_it_was_drawn() -> None:
+    """Each attempt's turn starts once, within its approach, takes its time and turns by its angle, to either side."""
+    settings = ApproachTurnSettings(speed=0.5, direction_deg=20.0, angle_deg=90.0, duration=10.0)
+    sides, shares = set(), []
+    for seed in range(40):
+        turning = build_current(settings, stream(seed, 0, "current"), 1000.0)
+        direction = math.radians(20.0)
+        for attempt, length in ((1, 200.0), (2, 100.0)):
+            begin, started = 500.0 * (attempt - 1), None
+            for k in range(int(length) * 2 + 1):
+                time, distance = begin + 0.5 * k, length - 0.5 * k
+                turning.approach(attempt, distance, time)
+                moving = np.any(turning.evaluate(time, np.zeros(3)).derivative != 0.0)
+                if moving and started is None:
+                    started = distance
+            assert started is not None
+            shares.append(started / length)
+            velocity = turning.evaluate(begin + 400.0, np.zeros(3)).velocity
+            after = math.atan2(velocity[1], velocity[0])
+            turn = math.remainder(after - direction, 2 * math.pi)
+            assert abs(turn) == pytest.approx(math.pi / 2, abs=1e-9)  # closed form: rate x duration
+            assert np.linalg.norm(velocity) == pytest.approx(0.5, abs=1e-12)
+            sides.add(math.copysign(1.0, turn))
+            direction = after
+    assert sides == {-1.0, 1.0}
+    # 80 draws of a uniform share: the mean's standard deviation is 0.032, four of them allowed.
+    assert np.mean(shares) == pytest.approx(0.5, abs=0.13)
+
+
+def test_approach_turn_derivative() -> None:
+    """The derivative is that of the velocity while it turns."""
+    turning = build_current(ApproachTurnSettings(), stream(3, 0, "current"), 1000.0)
+    for distance in range(200, 0, -1):
+        turning.approach(1, float(distance), 100.0)
+    h = 1e-4
+    before, now, after = (turning.evaluate(104.0 + k * h, np.zeros(3)) for k in (-1, 0, 1))
+    # Central differences of a sine at rate 0.16 rad/s: error below 1e-10.
+    np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), now.derivative, atol=1e-9)

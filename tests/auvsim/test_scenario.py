@@ -47,7 +47,11 @@ def message(values: dict, **places: str) -> str:
         ("vehicle.start", None, "null should be a mapping"),
         ("vehicle.start.range", {"gaussian": [0, 1]}, "{gaussian: [0, 1]} should be a valid number"),
         ("vehicle.model", 3, "3 should be a valid string"),
-        ("current", {"speed": 0.2}, "kind is not given; there are none, uniform, turning, shear, gust, sum"),
+        (
+            "current",
+            {"speed": 0.2},
+            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, sum",
+        ),
         ("current.kind", "unifrm", None),
         ("current.terms", None, None),
     ],
@@ -57,7 +61,7 @@ def test_bad_values_are_named(key: str, value: object, text: str | None) -> None
     found = message(nested(key, value))
     if text is None:
         assert found.startswith("current: ")
-        assert "there are none, uniform, turning, shear, gust, sum" in found
+        assert "there are none, uniform, turning, approach_turn, shear, gust, sum" in found
     else:
         assert found.startswith(f"{key}: {text}")
 
