@@ -9,7 +9,7 @@ from pydantic import Field, ValidationError, model_validator
 from auvsim import schema, yaml_text
 from auvsim.acoustics import AcousticSettings
 from auvsim.control import ControlSettings
-from auvsim.currents import CurrentSettings, UniformSettings
+from auvsim.current_settings import CurrentSettings, UniformSettings
 from auvsim.errors import InputError
 from auvsim.guidance import GuidanceSettings
 from auvsim.navigation import EstimatorSettings

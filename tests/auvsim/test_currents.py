@@ -9,7 +9,8 @@ from pydantic import TypeAdapter, ValidationError
 from scipy.linalg import expm
 from scipy.stats import chi2
 
-from auvsim.currents import GUST_CORRELATION, ApproachTurnSettings, CurrentSettings, GustSettings, build_current
+from auvsim.current_settings import ApproachTurnSettings, CurrentSettings, GustSettings
+from auvsim.currents import GUST_CORRELATION, build_current
 from auvsim.errors import InputError
 from auvsim.randomness import stream
 
