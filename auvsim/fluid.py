@@ -316,15 +316,28 @@ def _library() -> ctypes.CDLL:
     raise OSError(f"no MuJoCo library in {folder}")
 
 
-def is_warm() -> bool:
-    """Whether `install` needs no compilation: it ran before, in this process or, through numba's cache, in another."""
-    if _callback is not None:
-        return True
+def _cached_code() -> list[Path]:
+    """The index files of numba's cache for this module that are up to date; the others are deleted.
+
+    Numba watches the file of the function that it keeps, but this module's code has that of `forces` inside.
+    """
     try:
         folder = Path(FunctionCache(_build).cache_path)
     except RuntimeError:  # numba finds no folder that it may write to
-        return False
-    return any(folder.glob("fluid._build*.nbi"))
+        return []
+    written = Path(__file__).with_name("forces.py").stat().st_mtime
+    current = []
+    for index in folder.glob("fluid.*.nbi"):
+        if index.stat().st_mtime < written:
+            index.unlink(missing_ok=True)
+        else:
+            current.append(index)
+    return current
+
+
+def is_warm() -> bool:
+    """Whether `install` needs no compilation: it ran before, in this process or, through numba's cache, in another."""
+    return _callback is not None or any(index.name.startswith("fluid._build") for index in _cached_code())
 
 
 def install() -> None:
@@ -337,6 +350,7 @@ def install() -> None:
     """
     global _callback
     if _callback is None:
+        _cached_code()
         layout.verify()
         library = _library()
         for name in ("mj_makeM", "mj_factorM", "mj_projectConstraint"):

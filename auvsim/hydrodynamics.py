@@ -170,13 +170,19 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
             raise InputError(
                 f"{body.kind} '{body.name}' is not on a body with a free joint (hulls must be fixed to it)"
             )
-        if body.kind == "propeller" and (weld == base or model.body_dofnum[weld] != 1):
+        if body.kind == "propeller" and not _on_a_shaft(model, body.index):
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
         if body.kind == "hull" and model.body_simple[base]:
             raise InputError(
                 f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of"
                 " mass is its origin; move the centre of mass or add a hinged body"
             )
+
+
+def _on_a_shaft(model: mujoco.MjModel, body: int) -> bool:
+    joint = model.body_jntadr[body]
+    hinged = model.body_jntnum[body] == 1 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_HINGE
+    return bool(hinged and model.jnt_axis[joint, 0] > 1.0 - 1e-9)
 
 
 def _weigh_constraints(model: mujoco.MjModel) -> None:

@@ -175,12 +175,17 @@ class World:
         self.refresh_water()
         mujoco.mj_forward(self.model, self.data)
 
-    def refresh_water(self) -> None:
-        """Writes the local expansion of the current round the vehicle where the fluid callback reads it."""
-        position = self.data.qpos[self._q : self._q + 3]
-        water = self._current.evaluate(self.data.time, flip(position))
+    def refresh_water(self, ahead: float = 0.0) -> None:
+        """Writes the local expansion of the current round the vehicle where the fluid callback reads it.
+
+        Args:
+            ahead: how far from now the expansion is taken [s]; half the time for which it will serve makes its error
+                second order in that time.
+        """
+        position, time = self.data.qpos[self._q : self._q + 3], self.data.time + ahead
+        water = self._current.evaluate(time, flip(position))
         slot = self.data.userdata[self._slot : self._slot + WATER]
-        slot[0] = self.data.time
+        slot[0] = time
         slot[1:4] = position
         slot[4:7] = flip(water.velocity)
         slot[7:10] = flip(water.derivative)
@@ -202,7 +207,7 @@ class World:
             DivergenceError: the state is no longer finite and physical.
         """
         if not self._current.steady_uniform:
-            self.refresh_water()
+            self.refresh_water(0.5 * ticks * self.model.opt.timestep)
         x, y, z = self.data.qpos[self._q : self._q + 3].tolist()
         near = x * x + y * y + (z + self.pose.depth) ** 2 < NEAR**2 or z < 2.0 - self._floor
         # Far from everything the search for contacts would find none, and costs a third of a step.

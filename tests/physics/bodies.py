@@ -1,19 +1,22 @@
 """Small hydrodynamic bodies for the tests, and the textbook equations that they must obey.
 
-All in NED and forward-starboard-down. The flip to MuJoCo's axes and the equations of motion are written here a second time,
-on purpose: what the tests compare with must not come from the code under test.
+All in NED and forward-starboard-down. The flip to MuJoCo's axes and the equations of motion are written here a second
+time, on purpose: what the tests compare with must not come from the code under test.
 """
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from auvsim import hydrodynamics, library
-from auvsim.frames import Array
+
+Array = NDArray[Any]
 
 DENSITY = 1026.0  # of the water [kg/m3]
 GRAVITY = 9.81
@@ -156,7 +159,7 @@ def command(data: mujoco.MjData, rudder: float = 0.0, elevator: float = 0.0, rpm
 def set_motion(
     model: mujoco.MjModel, data: mujoco.MjData, nu: object, rotation: Array | None = None, position: object = (0, 0, 0)
 ) -> None:
-    """Puts the hull at a NED position and attitude (3, 3) with body velocity nu (6,) over ground, and calls mj_forward."""
+    """Puts the hull at a NED position and attitude (3, 3) with velocity nu (6,) over ground; calls mj_forward."""
     hull = model.body("hull").id
     base = model.body_weldid[hull]
     W, p = np.eye(3), np.zeros(3)

@@ -1,4 +1,4 @@
-"""Added mass is inertia: F / (m + a) along and about every axis, whatever the attitude, the mounting and the ratio a / m."""
+"""Added mass is inertia: F / (m + a) along and about every axis, for any attitude, mounting and ratio a / m."""
 
 import mujoco
 import numpy as np
@@ -68,7 +68,7 @@ def test_acceleration_of_any_motion_is_kirchhoffs(place):
 
 
 def test_munk_moment_turns_a_drifting_body_broadside():
-    """N = -(A22 - A11) u v: bow to port when the body drifts to starboard (Fossen 2021, sec. 8.1)."""
+    """N = -(A22 - A11) u v: bow to port when the body drifts to starboard. The published remus100 leaves it out."""
     added = np.diag([2.0, 30.0, 25.0, 0.1, 4.0, 5.0])
     model = free_body(added_mass=added, rigid=RIGID)
     data = mujoco.MjData(model)
@@ -84,7 +84,7 @@ def test_munk_moment_turns_a_drifting_body_broadside():
 
 @pytest.mark.parametrize("attitude", [np.eye(3), ATTITUDE], ids=["level", "tilted"])
 def test_remus100_gains_just_its_added_mass(attitude):
-    """The joint-space inertia of the whole tree with and without the callback differs by J' M_A J, and only at the base."""
+    """The joint-space inertia of the whole tree grows by J' M_A J, and only at the base."""
     model = remus100(equip=False)
     data = mujoco.MjData(model)
     dry, wet = np.zeros((model.nv, model.nv)), np.zeros((model.nv, model.nv))

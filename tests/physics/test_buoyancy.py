@@ -36,7 +36,8 @@ def test_remus100_rights_itself_at_its_natural_frequency(axis, angle_deg):
     data = mujoco.MjData(model)
     stiffness = model.body_subtreemass[1] * GRAVITY * ZG
     damping = (0.588, 0.0)[axis]  # linear K_p [N m s]
-    # Hull about its centre, z_g, four fins' 80 g at 0.13 m radius and 0.747 m behind, propeller at 0.815 m; added inertia.
+    # Hull about its centre, z_g, four fins' 80 g at 0.13 m radius and 0.747 m behind, propeller at 0.815 m; added
+    # inertia.
     inertia = (0.111 + 30.87 * ZG**2 + 0.08 * 0.13**2 + 0.0336, 3.933 + 0.08 * (0.747**2 + 0.815**2) + 3.426)[axis]
     omega = np.sqrt(stiffness / inertia - (damping / (2 * inertia)) ** 2)
 
@@ -54,8 +55,9 @@ def test_remus100_rights_itself_at_its_natural_frequency(axis, angle_deg):
     crossing = np.nonzero(np.diff(np.sign(history)))[0]
     times = 0.01 * (crossing + history[crossing] / (history[crossing] - history[crossing + 1]))
     assert len(times) == 5
-    # Half periods after the first swing. Sway goes with roll through m z_g (3 per cent of stiffness over inertia); quadratic
-    # damping and sin(20 deg) / 20 deg leave the rest. Without added inertia roll would be 14, pitch 37 per cent faster.
+    # Half periods after the first swing. Sway goes with roll through m z_g (3 per cent of stiffness over inertia);
+    # quadratic damping and sin(20 deg) / 20 deg leave the rest. Without added inertia roll would be 14, pitch 37 per
+    # cent faster.
     assert np.pi / np.diff(times).mean() == pytest.approx(omega, rel=0.04)
     assert np.abs(history[-100:]).max() < 0.5 * start[axis]
 

@@ -1,7 +1,8 @@
 """Contact and constraints act on the summed inertia: a wall bounce is that of the rigid body which has it.
 
-Isotropic added mass (a along, b about every axis, as a sphere's) is one that a dry rigid body can have as well: mass m + a and
-inertia I + b. Its Kirchhoff terms are then that body's gyroscopic terms, so the two must move alike in every respect.
+Isotropic added mass (a along, b about every axis, as a sphere's) is one that a dry rigid body can have as well: mass m
++ a and inertia I + b. Its Kirchhoff terms are then that body's gyroscopic terms, so the two must move alike in every
+respect.
 """
 
 import mujoco
@@ -59,8 +60,9 @@ def rise(state):
     return -(state[3:12].reshape(3, 3) @ state[12:15])[2]
 
 
-# Equal up to rounding of 1e-16, which the stiffness of contact amplifies over a hundred steps: measured 5e-13. PGS converges
-# linearly and with elliptic cones stops at its iteration limit, up to which it amplifies rounding more: measured 5e-10.
+# Equal up to rounding of 1e-16, which the stiffness of contact amplifies over a hundred steps: measured 5e-13. PGS
+# converges linearly and with elliptic cones stops at its iteration limit, up to which it amplifies rounding more:
+# measured 5e-10.
 TOLERANCE = {"Newton": 1e-11, "CG": 1e-11, "PGS": 1e-8}
 
 
@@ -89,7 +91,7 @@ def test_noslip_iterations_use_the_summed_inertia_too():
 
 
 def test_an_offset_centre_of_mass_bounces_alike_with_exact_constraint_weights():
-    """The dry body's centre of mass is elsewhere, so the approximate weights of constraints (taken there) differ: use exact ones."""
+    """Approximate constraint weights are taken at the centre of mass, where the two differ: use exact ones."""
     option = "<option><flag diagexact='enable'/></option>"
     wet, dry = pair(centre=(0.04, -0.02, 0.05), inside="", outside=option)
     (found, touched), (expected, _) = bounce(wet), bounce(dry)

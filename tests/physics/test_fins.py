@@ -21,7 +21,7 @@ def tail(at=(0.0, 0.0, 0.0), **coefficients):
 
 
 def lift_and_drag(model, data, alpha, speed=2.0):
-    """Force across and along the motion [N] of a fin that moves at an angle to its chord, drifting to starboard for alpha > 0."""
+    """Force across and against a motion at an angle to the chord [N]; alpha > 0 drifts to starboard."""
     set_motion(model, data, [speed * np.cos(alpha), speed * np.sin(alpha), 0, 0, 0, 0])
     X, Y = body_force(model, data)[:2]
     return -(Y * np.cos(alpha) - X * np.sin(alpha)), -(X * np.cos(alpha) + Y * np.sin(alpha))
@@ -48,7 +48,8 @@ def test_lift_falls_behind_the_stall_angle():
     assert 0.8 * STALL < best < STALL + 0.05  # the peak lies where the blend begins to win
     after = lift[(alphas > best) & (alphas < STEEP - 0.01)]  # a plate's own lift grows again, up to 45 degrees
     assert np.all(np.diff(after) < 0.0)
-    # An attached fin would still gain there: the published model's lift grows for ever, and that is what is wrong in it.
+    # An attached fin would still gain there: the published model's lift grows for ever, and that is what is wrong in
+    # it.
     assert after[-1] < 0.6 * SLOPE * np.sin(STEEP) * np.cos(STEEP)
     plate = alphas > STEEP
     assert lift[plate] == pytest.approx(1.2 * np.sin(alphas[plate]) * np.cos(alphas[plate]), abs=1e-12)  # a flat plate
@@ -65,7 +66,7 @@ def test_astern_flow_has_its_own_slope_and_still_opposes_the_drift():
         set_motion(model, data, [-2.0 * np.cos(drift), 2.0 * np.sin(drift), 0, 0, 0, 0])
         X, Y = body_force(model, data)[:2]
         # To the order of alpha^2; the normal force is lift (a) and, one part in 200, the drag's share C_D alpha.
-        assert Y == pytest.approx(-q * (0.7 * SLOPE + 0.01) * drift, rel=2 * drift**2 + 1e-3)
+        assert pytest.approx(-q * (0.7 * SLOPE + 0.01) * drift, rel=2 * drift**2 + 1e-3) == Y
         assert X > 0.0  # drag, ahead
     set_motion(model, data, [-2.0, 0, 0, 0, 0, 0])
     assert body_force(model, data)[:2] == pytest.approx([q * 0.01, 0.0], abs=1e-12)
@@ -111,7 +112,7 @@ def test_flow_at_the_fin_has_the_current_of_its_place_and_time():
     data.time = time
     set_motion(model, data, [1, 0, 0, 0, 0, 0], position=position)
     found = body_force(model, data)
-    water = velocity + derivative * time + gradient @ (position + [-0.7, 0.0, 0.0])
+    water = velocity + derivative * time + gradient @ (position + np.array([-0.7, 0.0, 0.0]))
     set_water(data)
     set_motion(model, data, [1.0 - water[0], -water[1], -water[2], 0, 0, 0])
     assert found == pytest.approx(body_force(model, data), abs=1e-12)  # the same sum in another order

@@ -62,7 +62,7 @@ def test_a_steady_uniform_current_only_shifts_the_track(name, integrator):
 
 
 def coincident(integrator, timestep=0.01):
-    """A neutral body with its centre of mass in its centre of buoyancy: no uniform acceleration of the water turns it."""
+    """A neutral body, its centre of mass in its centre of buoyancy: accelerating water does not turn it."""
     mass = 12.0
     fields = {
         "hull_linear_damping": dense(2, 3.0, 0.5),
@@ -85,8 +85,10 @@ def coincident(integrator, timestep=0.01):
 @pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast", "RK4"])
 @pytest.mark.parametrize("nu", [np.zeros(6), np.array([1.0, 0.3, -0.2, 0.5, -0.6, 0.8])], ids=["at rest", "tumbling"])
 def test_an_accelerating_current_carries_a_neutral_body_along(nu, integrator):
-    """The water at time t is v + a t, in one expansion that is never refreshed: every step and RK4 stage must read it at its
-    own time. Velocity through the water is then that in still water, whatever the step."""
+    """The water at time t is v + a t, in one expansion that is never refreshed.
+
+    Every step and RK4 stage must read it at its own time. Velocity through the water is then that in still water.
+    """
     velocity, derivative = np.array([0.3, -0.4, 0.1]), np.array([0.05, 0.08, -0.02])
     states = []
     for v, a in ((np.zeros(3), np.zeros(3)), (velocity, derivative)):
@@ -133,7 +135,7 @@ def test_a_turning_current_carries_a_neutral_body_along():
 
 
 def test_water_of_another_place_and_time_is_the_expansions():
-    """Force on a body at rest at (t, x) in water v + a t + G x is that of a body moving at -(v + a t + G x), plus a_c."""
+    """Force at rest at (t, x) in water v + a t + G x is that of a motion at -(v + a t + G x), plus that of a_c."""
     random = np.random.default_rng(1)
     added = dense(1, 20.0, 2.0)
     fields = {"hull_linear_damping": np.diag([3.0, 4.0, 5.0, 0.0, 0.0, 0.0])}

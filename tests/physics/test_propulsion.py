@@ -60,7 +60,7 @@ def test_advance_speed_is_through_the_water():
 
 
 def test_torque_rolls_the_vehicle_against_the_shaft():
-    """A right-handed propeller rolls the hull to port (negative), to where the weight holds it: as Prestero's K_prop < 0.
+    """A right-handed propeller rolls the hull to port (negative), until the weight holds it: as Prestero's K_prop < 0.
 
     The published Python model has the same angle, 1.019 degrees at 1525 rpm, to the other side.
     """

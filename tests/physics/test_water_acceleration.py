@@ -3,7 +3,8 @@
 import mujoco
 import numpy as np
 import pytest
-from bodies import DENSITY, WHEEL, Rigid, acceleration, free_body, motion, set_motion, set_water
+from bodies import DENSITY, WHEEL, Rigid, acceleration, body_force, free_body, motion, set_motion, set_water
+from scipy.spatial.transform import Rotation
 
 MASS, ADDED = 12.5, 20.0  # with the wheel
 SPHERE = np.diag([ADDED, ADDED, ADDED, 0.5, 0.5, 0.5])
@@ -34,7 +35,7 @@ def test_force_of_accelerating_water_on_a_body_at_rest(ratio):
 
 @pytest.mark.parametrize("ratio", [0.5, 1.0, 2.0], ids=["heavy", "neutral", "light"])
 def test_straining_flow_pushes_a_body_by_its_convective_acceleration(ratio):
-    """In the steady flow v_c = G x with G = diag(g, -g, 0) the water at x accelerates by G^2 x though nothing changes in time.
+    """In the steady flow v_c = G x, G = diag(g, -g, 0), the water at x accelerates by G^2 x though dv_c/dt is zero.
 
     Released at rest, x'' = k g^2 x with k = (rho V + a) / (m + a), so x = x0 cosh(sqrt(k) g t), and the same across it.
     A peer that takes only dv_c/dt finds no force at all here.
@@ -72,7 +73,7 @@ def test_a_neutral_body_follows_its_streamline(integrator):
 
 
 def test_rotating_water_holds_a_neutral_body_on_its_circle():
-    """In a vortex v_c = Omega x r the pressure gradient is centripetal: rho V Omega^2 r inwards, and so is added mass's."""
+    """In a vortex v_c = Omega x r the pressure gradient pushes inwards, rho V Omega^2 r, and so does added mass."""
     rate = 0.3
     model = ball(MASS / DENSITY)
     data = mujoco.MjData(model)
@@ -87,7 +88,7 @@ def test_rotating_water_holds_a_neutral_body_on_its_circle():
 
 
 def test_shear_turns_a_hull_by_its_cross_flow():
-    """East flow that grows northward, v_c = s x: a hull that turns with it has the same transverse flow everywhere: none."""
+    """East flow that grows northward, v_c = s x: a hull that turns with it has no transverse flow anywhere."""
     s = 0.2
     fields = {"hull_cross_flow_drag": 1.2, "hull_strip_x": [-0.6, -0.2, 0.2, 0.6], "hull_strip_area": [0.04] * 4}
     model = free_body(added_mass=np.diag([1.0, 20.0, 20.0, 0.1, 3.0, 3.0]), fields=fields)
@@ -96,9 +97,29 @@ def test_shear_turns_a_hull_by_its_cross_flow():
     gradient[1, 0] = s
     set_water(data, gradient=gradient)
     set_motion(model, data, [0, 0, 0, 0, 0, s])
-    # The pitching, rolling and Coriolis terms of the added mass are zero at v_r = 0, so nothing is left of yaw and sway.
+    # The pitching, rolling and Coriolis terms of the added mass are zero at v_r = 0, so nothing is left of yaw and
+    # sway.
     assert data.qfrc_passive[5] == pytest.approx(0.0, abs=1e-14)
     set_motion(model, data, np.zeros(6))
     strips = np.array([-0.6, -0.2, 0.2, 0.6])
     moment = 0.5 * 1026.0 * 1.2 * 0.04 * np.sum(strips * np.abs(s * strips) * s * strips)
     assert -data.qfrc_passive[5] == pytest.approx(moment, rel=1e-12)  # to starboard, with the water
+
+
+def test_cross_flow_in_any_gradient_is_the_strip_sum_of_local_velocities():
+    """Each strip sees its own water, v_c(x) = G R x along a hull of any attitude, and drags by the resultant there."""
+    random = np.random.default_rng(4)
+    xs, area = np.array([-0.6, -0.2, 0.2, 0.6]), 0.04
+    fields = {"hull_cross_flow_drag": 1.2, "hull_strip_x": xs, "hull_strip_area": [area] * 4}
+    model = free_body(added_mass=np.zeros((6, 6)), fields=fields)
+    data = mujoco.MjData(model)
+    for _ in range(10):
+        G, nu = random.uniform(-0.3, 0.3, (3, 3)), random.uniform(-0.5, 0.5, 6)
+        R = Rotation.random(rng=random).as_matrix()
+        set_water(data, gradient=G)
+        set_motion(model, data, nu, R)
+        along = xs[:, None] * np.array([1.0, 0.0, 0.0])
+        local = nu[:3] + np.cross(nu[3:], along) - along @ (R.T @ G @ R).T
+        drag = -0.5 * DENSITY * 1.2 * area * np.hypot(local[:, 1], local[:, 2])[:, None] * local * [0, 1, 1]
+        expected = np.concatenate([drag.sum(axis=0), np.cross(along, drag).sum(axis=0)])
+        assert body_force(model, data) == pytest.approx(expected, abs=1e-11)  # rounding
