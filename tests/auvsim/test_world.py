@@ -293,3 +293,20 @@ def test_two_worlds_at_once_do_not_disturb_each_other():
 
     together = run([build((0.1, 0, 0)), build((-0.3, 0.2, 0))])
     assert np.array_equal(together[0], run([build((0.1, 0, 0))])[0])
+
+
+def test_the_water_of_one_call_is_right_to_second_order():
+    """A turning current, expanded once a call: against an expansion every tick the error falls with the square."""
+
+    def velocity(ticks: int) -> np.ndarray:
+        world = build(field=Turning(TurningSettings(speed=0.5, start=0.0, end=10.0)))
+        world.place(np.array([-200.0, 0.0, 20.0]), 0.0, 1.0, 62.0)
+        for _ in range(400 // ticks):
+            world.advance(ticks)
+        return world.data.qvel[:6].copy()
+
+    exact = velocity(1)
+    coarse, fine = (np.linalg.norm(velocity(ticks) - exact) for ticks in (40, 20))
+    # Expansions of 0.4 and 0.2 s against 0.01 s, which itself is off by 1/400 of the finer one's error.
+    assert coarse / fine == pytest.approx(4.0, rel=0.1)
+    assert fine < 1e-3
