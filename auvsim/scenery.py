@@ -34,6 +34,12 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
     root.visual.headlight.ambient, root.visual.headlight.diffuse = (0.38, 0.42, 0.44), (0.25, 0.27, 0.28)
     root.visual.headlight.specular = (0.1, 0.1, 0.1)
     root.visual.rgba.fog = root.visual.rgba.haze = (*WATER, 1.0)
+    _add_sea_floor(root, sea_floor)
+    _add_light(root)
+
+
+def _add_sea_floor(root: Any, depth: float) -> None:
+    """Squares of half a tile, so that the overview has a scale."""
     root.asset.add(
         "texture",
         name="sand",
@@ -46,6 +52,18 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
     )
     repeat = 2.0 * HALF_WIDTH / TILE
     root.asset.add("material", name="sand", texture="sand", texrepeat=(repeat, repeat), specular=0, shininess=0)
+    root.worldbody.add(
+        "geom",
+        name="sea_floor",
+        type="plane",
+        size=(HALF_WIDTH, HALF_WIDTH, 10),
+        pos=(0, 0, -depth),
+        material="sand",
+    )
+
+
+def _add_light(root: Any) -> None:
+    """Sun, and water that is light above and dark below."""
     root.asset.add(
         "texture",
         name="water",
@@ -65,14 +83,6 @@ def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
         diffuse=(0.62, 0.68, 0.68),
         specular=(0.3, 0.3, 0.3),
         castshadow=False,
-    )
-    root.worldbody.add(
-        "geom",
-        name="sea_floor",
-        type="plane",
-        size=(HALF_WIDTH, HALF_WIDTH, 10),
-        pos=(0, 0, -sea_floor),
-        material="sand",
     )
 
 

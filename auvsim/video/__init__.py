@@ -22,12 +22,13 @@ from auvsim.log import TrialLog
 from auvsim.video.canvas import Picture
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage
-from auvsim.video.storyboard import Frame, storyboard, verdict
+from auvsim.video.storyboard import NEAR, Frame, storyboard, verdict
 
 __all__ = ["DrawingError", "render", "still"]
 
 FPS = 25
 QUALITY = 27  # constant rate factor of x264
+JUST_BEFORE = 1.2  # range of the nose at which a still picture is taken [m]
 WAITING = 8  # pictures drawn ahead of the encoder
 
 
@@ -88,7 +89,7 @@ def still(
     Args:
         log: of any status.
         path: of the picture.
-        time: of the trial [s]; by default when the nose is in the mouth of the dock, or else nearest to it.
+        time: of the trial [s]; by default just before the nose comes nearest to the dock's mouth.
         width: [pixels].
         height: [pixels].
         cameras: as for `render`.
@@ -99,8 +100,9 @@ def still(
     """
     playback = Playback(log)
     if time is None:
-        time = float(playback.times[playback.ranges.argmin()])
-    near = bool(playback.at(time).range < 30.0)
+        nearest = int(playback.ranges.argmin())
+        time = float(playback.times[np.flatnonzero(playback.ranges[: nearest + 1] >= JUST_BEFORE).max(initial=0)])
+    near = playback.at(time).range < NEAR
     frame = Frame(time=time, speed=0.0, near=near, banner=verdict(playback) if time >= playback.end else "")
     try:
         with Stage(playback, width, height, cameras, samples=4) as stage, whole(Path(path)) as partial:
@@ -110,7 +112,9 @@ def still(
 
 
 def _save_png(picture: Picture, path: Path) -> None:
-    matplotlib.image.imsave(path, np.ascontiguousarray(picture), format="png")
+    # Six bits of eight: the sand's finest grain is not seen, and would double the file.
+    coarse = np.ascontiguousarray(picture & 0xFC)
+    matplotlib.image.imsave(path, coarse, format="png", pil_kwargs={"compress_level": 9})
 
 
 def _encode(
@@ -138,7 +142,9 @@ def _encode(
 def _movie(path: Path, size: tuple[int, int], fps: int) -> Iterator[Callable[[Picture], None]]:
     """A function that appends a picture to the video."""
     with av.open(str(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
-        stream = container.add_stream("libx264", rate=Fraction(fps), options={"crf": str(QUALITY), "preset": "veryfast"})
+        stream = container.add_stream(
+            "libx264", rate=Fraction(fps), options={"crf": str(QUALITY), "preset": "veryfast"}
+        )
         stream.width, stream.height = size
         stream.pix_fmt = "yuv420p"
 

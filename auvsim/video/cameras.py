@@ -1,4 +1,4 @@
-"""Where the scene is looked at from: the whole trial, the vehicle from behind and from above, the dock from its side."""
+"""Where the scene is looked at from: the whole trial, the vehicle from behind and from above, the dock from aside."""
 
 import math
 from collections.abc import Callable
@@ -61,7 +61,7 @@ class Cameras:
         if self._azimuth is None:
             self._azimuth = wanted
         self._azimuth += (wanted - self._azimuth) * (1.0 - math.exp(-step / SETTLING))
-        return _camera(moment.position + [0.0, 0.0, 0.15], 4.2, self._azimuth + 14.0, -17.0)
+        return _camera(moment.position + np.array([0.0, 0.0, 0.15]), 4.2, self._azimuth + 14.0, -17.0)
 
     def _above(self, moment: Moment, step: float) -> mujoco.MjvCamera:
         """From straight above, the dock's axis upwards, from so high that the estimate is in the picture too."""

@@ -1,6 +1,7 @@
 """OpenGL without a window: scenes drawn into rectangles of one picture."""
 
-from typing import NamedTuple
+import os
+from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
@@ -12,6 +13,18 @@ Picture = NDArray[np.uint8]  # (height, width, 3), first row on top
 NO_OPENGL = (
     "no OpenGL to draw with ({}): apt-get install libegl1 libgl1, then `auvsim video DIR/trial.nc` makes the video"
 )
+
+
+def _context_class() -> Any:
+    """The OpenGL that MUJOCO_GL names; MuJoCo's own choice is made when it is imported, perhaps before auvsim."""
+    name = os.environ.get("MUJOCO_GL", "").lower()
+    if name == "egl":
+        from mujoco.egl import GLContext
+
+        return GLContext
+    if not hasattr(mujoco, "GLContext"):
+        raise RuntimeError(f"MUJOCO_GL is '{name}'")
+    return mujoco.GLContext
 
 
 class Box(NamedTuple):
@@ -44,7 +57,7 @@ class Canvas:
         # Round shapes are few and small: coarse ones save a third of the time of software drawing.
         model.vis.quality.numslices, model.vis.quality.numstacks = 16, 8
         try:
-            self._gl = mujoco.GLContext(width, height)
+            self._gl = _context_class()(width, height)
             self._gl.make_current()
             self._context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
             mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)

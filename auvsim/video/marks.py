@@ -1,17 +1,14 @@
 """What is drawn into the scene beside its bodies: tracks, fixes, the estimate, the water's motion, enlarged symbols."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from itertools import pairwise
 
-import mujoco
 import numpy as np
 
 from auvsim.frames import Array
+from auvsim.video.layer import ARROW, DOT, LINE, Colour, Layer, Mark
 from auvsim.video.playback import Belief, Moment, Playback
-
-Colour = tuple[float, float, float, float]
 
 TRUE: Colour = (1.0, 0.86, 0.15, 1.0)
 ESTIMATE: Colour = (1.0, 0.25, 0.78, 1.0)
@@ -19,89 +16,12 @@ FIX: Colour = (0.95, 0.97, 1.0, 1.0)
 REFUSED: Colour = (1.0, 0.15, 0.1, 1.0)
 CURRENT: Colour = (0.45, 0.95, 1.0, 1.0)
 DOCK: Colour = (1.0, 0.55, 0.2, 1.0)
-FLOOR: Colour = (0.32, 0.62, 0.72, 1.0)  # in the overview
 MOTE: Colour = (0.75, 0.92, 0.92, 1.0)
 
 SIGMAS = 2.0  # of the ellipse round the estimate
 MOTES, MOTE_CUBE = 90, 11.0  # specks in the water round the vehicle, and the side of the cube they fill [m]
 ARROW_TIME = 7.0  # [s]
 STILL_WATER = 0.01  # slower water has no arrows [m/s]
-UPRIGHT = np.eye(3).ravel()
-_NOTHING = np.zeros(3)
-
-LINE, ARROW = mujoco.mjtGeom.mjGEOM_LINE, mujoco.mjtGeom.mjGEOM_ARROW
-BALL, BLOCK = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_BOX
-
-
-class Mark(NamedTuple):
-    """Something that stays once it has been drawn."""
-
-    time: float  # from when it is drawn [s]
-    kind: mujoco.mjtGeom
-    width: float  # pixels of a line, metres of anything else
-    start: Array  # (3,)
-    end: Array  # (3,)
-    colour: Colour
-
-
-class Layer:
-    """A MuJoCo scene: its bodies, then marks that stay and grow in number, then marks of the moment."""
-
-    def __init__(self, playback: Playback, marks: Sequence[Mark], moving: int, *, overview: bool) -> None:
-        """Makes room for `marks` and `moving` marks of the moment; an overview has clear water and no vehicle."""
-        self._model, self._data = playback.model, playback.data
-        self._bodies = mujoco.mjtCatBit.mjCAT_STATIC if overview else mujoco.mjtCatBit.mjCAT_ALL
-        self._option = mujoco.MjvOption()
-        self._marks = sorted(marks, key=lambda mark: mark.time)
-        self.scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + len(marks) + moving + 50)
-        self._geoms = self.scene.geoms
-        for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
-            self.scene.flags[flag] = 0
-        self.scene.flags[mujoco.mjtRndFlag.mjRND_FOG] = int(not overview)
-        self._kept = 0
-        self._moves = not overview
-        self._update()
-        self._count = self.scene.ngeom
-        if overview:  # through so much water the sea floor is dark and blue
-            floor = self._model.geom("sea_floor").id
-            for geom in self._geoms[: self._count]:
-                if geom.objtype == mujoco.mjtObj.mjOBJ_GEOM and geom.objid == floor:
-                    geom.rgba = FLOOR
-
-    def _update(self) -> None:
-        camera = mujoco.MjvCamera()
-        mujoco.mjv_updateScene(self._model, self._data, self._option, None, camera, self._bodies, self.scene)
-
-    def begin(self, time: float) -> None:
-        """Moves the bodies to where the model is and keeps the marks up to that time; it never goes back."""
-        if self._moves:
-            self._update()
-        kept, self.scene.ngeom = self._kept, self._count + self._kept
-        while kept < len(self._marks) and self._marks[kept].time <= time:
-            mark = self._marks[kept]
-            self.join(mark.kind, mark.width, mark.start, mark.end, mark.colour)
-            kept += 1
-        self._kept = kept
-
-    def join(self, kind: mujoco.mjtGeom, width: float, start: Array, end: Array, colour: Colour) -> None:
-        """Adds a line, arrow or block from one point to another."""
-        geom = self._add(kind, colour)
-        if kind == BLOCK:  # a square dot
-            geom.pos, geom.size = start, (width, width, width)
-        else:
-            mujoco.mjv_connector(geom, kind, width, start, end)
-
-    def ball(self, size: Sequence[float], position: Array, matrix: Array, colour: Colour) -> None:
-        """Adds an ellipsoid of semi-axes (3,) [m]."""
-        geom = self._add(BALL, colour)
-        geom.pos, geom.size, geom.mat = position, size, matrix.reshape(3, 3)
-
-    def _add(self, kind: mujoco.mjtGeom, colour: Colour) -> mujoco.MjvGeom:
-        geom = self._geoms[self.scene.ngeom]
-        mujoco.mjv_initGeom(geom, kind, _NOTHING, _NOTHING, UPRIGHT, np.array(colour, dtype=np.float32))
-        geom.emission, geom.specular = 0.8, 0.0
-        self.scene.ngeom += 1
-        return geom
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,17 +36,15 @@ class Tracks:
 
     @classmethod
     def of(cls, playback: Playback, spacing: float, dot: float) -> "Tracks":
-        """The tracks of a trial with corners at least `spacing` apart, and its fixes as dots of half width `dot` [m]."""
+        """The tracks with corners at least `spacing` apart, and the fixes as dots of half width `dot` [m]."""
         true = _thin(playback.positions, spacing)
         believed = _thin(playback.belief_positions, spacing)
         corners = playback.positions[true], playback.times[true]
         beliefs = playback.belief_positions[believed], playback.belief_times[believed]
         marks = [*_polyline(*corners, 3.0, TRUE), *_polyline(*beliefs, 2.0, ESTIMATE)]
         for time, place, taken in zip(*playback.received_fixes(), strict=True):
-            marks.append(Mark(float(time), BLOCK, dot, place, place, FIX if taken else REFUSED))
-        return cls(
-            true=corners[0], true_times=corners[1], believed=beliefs[0], believed_times=beliefs[1], marks=marks
-        )
+            marks.append(Mark(float(time), DOT, dot, place, place, FIX if taken else REFUSED))
+        return cls(true=corners[0], true_times=corners[1], believed=beliefs[0], believed_times=beliefs[1], marks=marks)
 
     def tips(self, layer: Layer, moment: Moment) -> None:
         """Draws both tracks from their last corner to where they are now."""
@@ -145,9 +63,7 @@ def _thin(points: Array, spacing: float) -> list[int]:
 
 
 def _polyline(points: Array, times: Array, width: float, colour: Colour) -> list[Mark]:
-    return [
-        Mark(float(times[i + 1]), LINE, width, points[i], points[i + 1], colour) for i in range(len(points) - 1)
-    ]
+    return [Mark(float(times[i + 1]), LINE, width, points[i], points[i + 1], colour) for i in range(len(points) - 1)]
 
 
 def _tip(layer: Layer, points: Array, times: Array, time: float, end: Array, width: float, colour: Colour) -> None:
@@ -160,21 +76,21 @@ class NearMarks:
     """The marks of views of some metres: tracks, ghost of the estimate, specks and arrows that move with the water."""
 
     def __init__(self, playback: Playback) -> None:
-        self._tracks = Tracks.of(playback, 0.6, 0.05)
+        self._tracks = Tracks.of(playback, 1.0, 0.03)
         marks = self._tracks.marks + _axis(playback, 1.0, 40.0)
-        self.layer = Layer(playback, marks, MOTES + 40, overview=False)
+        self.layer = Layer(playback, marks, overview=False)
         self._motes = np.random.default_rng(0).uniform(0.0, MOTE_CUBE, (MOTES, 3))
         self._length = 2.0 * playback.nose
 
     def update(self, moment: Moment, speed: float) -> None:
         """Draws the moment; in time-lapse specks would only flicker."""
         layer = self.layer
-        layer.begin(moment.time)
+        layer.begin(moment)
         self._tracks.tips(layer, moment)
         if moment.belief is not None:
             _ellipse(layer, moment.belief, 0.01)
             matrix = _turned(-moment.belief.heading)
-            layer.ball((0.5 * self._length, 0.1, 0.1), moment.belief.position, matrix, (*ESTIMATE[:3], 0.4))
+            layer.ball((0.5 * self._length, 0.07, 0.07), moment.belief.position, matrix, (*ESTIMATE[:3], 0.35))
         if float(np.linalg.norm(moment.current)) > STILL_WATER:
             self._arrows(moment)
         if speed <= 5.0:
@@ -202,21 +118,25 @@ class FarMarks:
 
     def __init__(self, playback: Playback, distance: float) -> None:
         self.unit = unit = 0.01 * distance
-        self._tracks = Tracks.of(playback, 0.35 * unit, 0.22 * unit)
+        self._tracks = Tracks.of(playback, 1.0 * unit, 0.22 * unit)
         self.above = np.array([0.0, 0.0, 3.4 * unit])  # from a symbol to its name
-        marks = self._tracks.marks + _funnel(playback, unit) + _axis(playback, 1.6 * unit, playback.plan.guidance.gate_distance)
-        self.layer = Layer(playback, marks, 100, overview=True)
+        marks = (
+            self._tracks.marks
+            + _funnel(playback, unit)
+            + _axis(playback, 1.6 * unit, playback.plan.guidance.gate_distance)
+        )
+        self.layer = Layer(playback, marks, overview=True)
         self._floor = playback.model.geom("sea_floor").pos[2]
         low, high = playback.positions[:, :2].min(axis=0), playback.positions[:, :2].max(axis=0)
         low, high = np.minimum(low, 0.0) - 6.0 * unit, np.maximum(high, 0.0) + 6.0 * unit
         counts = np.maximum(np.round((high - low) / (14.0 * unit)), 1).astype(int)
         grid = [np.linspace(low[i], high[i], counts[i] + 1) for i in range(2)]
-        self._stations = [np.array([x, y, playback.mouth[2]]) for x in grid[0] for y in grid[1]][:80]
+        self._stations = [np.array([x, y, playback.mouth[2]]) for x in grid[0] for y in grid[1]][:200]
 
     def update(self, moment: Moment, speed: float) -> None:
         """Draws the moment."""
         layer, unit = self.layer, self.unit
-        layer.begin(moment.time)
+        layer.begin(moment)
         self._tracks.tips(layer, moment)
         forward = _turned(-moment.heading)[:, 0]
         foot = np.array([*moment.position[:2], self._floor])
@@ -224,13 +144,21 @@ class FarMarks:
         if moment.belief is not None:
             _ellipse(layer, moment.belief, 0.02 * unit)
             layer.ball((0.5 * unit,) * 3, moment.belief.position, np.eye(3), ESTIMATE)
-        layer.join(ARROW, 0.6 * unit, moment.position - 3.5 * unit * forward, moment.position + 3.5 * unit * forward, TRUE)
+        layer.join(
+            ARROW, 0.6 * unit, moment.position - 3.5 * unit * forward, moment.position + 3.5 * unit * forward, TRUE
+        )
         if float(np.linalg.norm(moment.current)) > STILL_WATER:
             speed = float(np.linalg.norm(moment.current))
             length = min(30.0 * speed, 11.0) * unit  # no longer than to the next arrow
             flow = length * moment.current / speed
             for station in self._stations:
-                layer.join(ARROW, min(0.14 * unit, 0.08 * length), station - 0.5 * flow, station + 0.5 * flow, (*CURRENT[:3], 0.75))
+                layer.join(
+                    ARROW,
+                    min(0.14 * unit, 0.08 * length),
+                    station - 0.5 * flow,
+                    station + 0.5 * flow,
+                    (*CURRENT[:3], 0.75),
+                )
 
 
 def _ellipse(layer: Layer, belief: Belief, thickness: float) -> None:
@@ -259,7 +187,7 @@ def _funnel(playback: Playback, unit: float) -> list[Mark]:
     round_about = np.outer(np.cos(angles), side) + np.outer(np.sin(angles), up)
     mouth = playback.mouth + 2.4 * unit * round_about
     throat = playback.mouth + 3.0 * unit * axis + 0.6 * unit * round_about
-    pairs = [*zip(mouth[:-1], mouth[1:], strict=True), *zip(throat[:-1], throat[1:], strict=True)]
+    pairs = [*pairwise(mouth), *pairwise(throat)]
     pairs += list(zip(mouth[:-1], throat[:-1], strict=True))
     pairs.append((playback.mouth + 3.0 * unit * axis, playback.mouth + 5.0 * unit * axis))
     return [Mark(-math.inf, LINE, 2.0, a, b, DOCK) for a, b in pairs]

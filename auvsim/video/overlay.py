@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from auvsim.drawing import phase_colour, phase_name
 from auvsim.video import marks
 from auvsim.video.canvas import Box, Picture
+from auvsim.video.layer import Colour
 from auvsim.video.playback import Moment, Playback
 
 WHITE, GREY = (255, 255, 255), (165, 185, 195)
@@ -30,7 +31,7 @@ class Style(NamedTuple):
     bold: bool = False
 
 
-def rgb(colour: marks.Colour | str) -> Rgb:
+def rgb(colour: Colour | str) -> Rgb:
     """A colour in bytes."""
     red, green, blue = to_rgb(colour if isinstance(colour, str) else colour[:3])
     return round(255 * red), round(255 * green), round(255 * blue)
@@ -100,7 +101,7 @@ def label(picture: Picture, text: str, place: tuple[int, int] | None, colour: Rg
 
 def banner(picture: Picture, text: str, view: Box, scale: float) -> None:
     """What has just happened, across the top of a view; shortened to fit."""
-    style = Style(19.0 * scale, WHITE, bold=True)
+    text, style = " ".join(text.split()), Style(19.0 * scale, WHITE, bold=True)
     room = view.width - round(32 * scale)
     while text_width(text, style) > room and len(text) > 4:
         text = text[:-2].rstrip(" .…") + "…"
@@ -125,13 +126,15 @@ def panel(picture: Picture, playback: Playback, moment: Moment, speed: float, co
     fill(picture, box, PANEL) if solid else darken(picture, box)
 
     def put(text: str, x: float, baseline: float, style: Style) -> None:
-        write(picture, text, corner.x + round(x * k), corner.y + round(baseline * k), style._replace(size=style.size * k))
+        sized = style._replace(size=style.size * k)
+        write(picture, text, corner.x + round(x * k), corner.y + round(baseline * k), sized)
 
     attributes = playback.log.attributes
     put(f"{playback.vehicle_name} docking", 16, 30, Style(19, WHITE, bold=True))
     number = f"seed {attributes['seed']}, trial {attributes['trial']}"
     put(number, 400 - text_width(number, Style(13)), 29, Style(13, GREY))
-    fill(picture, Box(corner.x + round(16 * k), corner.y + round(42 * k), round(230 * k), round(30 * k)), rgb(phase_colour(moment.phase)))
+    chip = Box(corner.x + round(16 * k), corner.y + round(42 * k), round(230 * k), round(30 * k))
+    fill(picture, chip, rgb(phase_colour(moment.phase)))
     put(phase_name(moment.phase) if moment.phase >= 0 else "start", 26, 63, Style(19, WHITE, bold=True))
     put(f"attempt {moment.attempt}", 262, 63, Style(17, WHITE))
     for (name, value), (column, row) in zip(_numbers(moment, speed), np.ndindex(3, 2), strict=True):
@@ -170,5 +173,3 @@ def _legend(picture: Picture, corner: Box, k: float) -> None:
         height = 7 if width == 7 else 4
         fill(picture, Box(x, y - round((4 + height / 2) * k), round(width * k), max(round(height * k), 1)), rgb(colour))
         write(picture, text, x + round(20 * k), y, Style(13 * k, WHITE))
-
-

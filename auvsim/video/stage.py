@@ -18,7 +18,7 @@ NAMES = {
     "above": "from above, dock axis up",
     "dock": "dock",
 }
-SIDE = 0.325  # part of the width that the views beside the main one take
+SIDE, READABLE = 0.325, 290  # part of the width that the views beside the main one take; least width for text
 
 
 class Stage:
@@ -36,7 +36,9 @@ class Stage:
         InputError: there is no such camera, or they are too many.
     """
 
-    def __init__(self, playback: Playback, width: int, height: int, cameras: Sequence[str] = (), samples: int = 0) -> None:
+    def __init__(
+        self, playback: Playback, width: int, height: int, cameras: Sequence[str] = (), samples: int = 0
+    ) -> None:
         if len(cameras) > 3:
             raise InputError(f"video: {len(cameras)} cameras: at most three fit into the picture")
         self._playback, self._names = playback, tuple(cameras)
@@ -44,9 +46,12 @@ class Stage:
         self._cameras = Cameras(playback, self._boxes[0].width / self._boxes[0].height)
         for name in cameras:
             self._cameras.check(name)
-        side = round(SIDE * width)
+        side = side_width(width)
         self._corner = Box(
-            width - side if len(self._boxes) > 1 else 0, 0, side, round(side * overlay.PANEL_HEIGHT / overlay.PANEL_WIDTH)
+            width - side if len(self._boxes) > 1 else 0,
+            0,
+            side,
+            round(side * overlay.PANEL_HEIGHT / overlay.PANEL_WIDTH),
         )
         playback.pose_model(playback.at(playback.start))
         self._near = NearMarks(playback)
@@ -88,6 +93,7 @@ class Stage:
         camera = self._cameras.aim(name, moment, step)
         marks = self._far if name == "overview" else self._near
         mujoco.mjv_updateCamera(self._playback.model, self._playback.data, camera, marks.layer.scene)
+        marks.layer.sky(name in ("follow", "dock"))
         self._canvas.draw(marks.layer.scene, box)
         if name == "overview":
             places["AUV"] = project(marks.layer.scene, moment.position + self._far.above, box)
@@ -115,11 +121,16 @@ class Stage:
             overlay.banner(picture, frame.banner, Box(main.x + left, main.y, main.width - left, main.height), scale)
 
 
+def side_width(width: int) -> int:
+    """Width of the panel and of the views below it [pixels]."""
+    return round(max(SIDE * width, min(READABLE, 0.5 * width)))
+
+
 def layout(width: int, height: int, views: int) -> list[Box]:
     """The main view, and those beside it below the panel."""
     if views == 1:
         return [Box(0, 0, width, height)]
-    side = round(SIDE * width)
+    side = side_width(width)
     top = round(side * overlay.PANEL_HEIGHT / overlay.PANEL_WIDTH)
     each = (height - top) // (views - 1)
     boxes = [Box(0, 0, width - side, height)]

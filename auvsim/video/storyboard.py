@@ -1,6 +1,7 @@
 """Which moments of a trial the video shows, how fast, and from where: time-lapse far off, slow at the dock."""
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -13,13 +14,12 @@ MISSED = 4.0  # speed-up near the dock where the vehicle does not dock
 LAST_METRES = 2.0
 DOCKING = 1.0
 RAMP = 1.0  # change of the speed-up in a second of the trial [1/s]
-NEAR = 16.0  # range at which the dock is looked at [m]
+NEAR = 13.0  # range at which the dock is looked at [m]
 CLOSE = 6.0  # time before docking that is shown as it was [s]
-LONGEST, SHORTEST = 50.0, 10.0  # of the video without its end [s]
+LONGEST, SHORTEST = 45.0, 10.0  # of the video without its end [s]
 HOLD = 2.5  # how long the end stands [s]
 BANNER = 3.5  # how long an event is told [s]
-
-LEAST_SHOT = 1.5  # a stretch away from the dock between two near it that would be shown shorter than this is no cut [s]
+LEAST_SHOT = 1.5  # shown shorter than this, a stretch away from the dock is no shot of its own [s]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -45,7 +45,7 @@ def storyboard(playback: Playback, fps: float, lapse: float | None = None) -> li
     shown = _elapsed(times, speeds)
     if lapse is None:
         factor = max(shown[-1] / LONGEST, 1.0) if shown[-1] > SHORTEST else shown[-1] / SHORTEST
-        speeds = np.maximum(speeds * factor, min(1.0, float(speeds.min())))
+        speeds = np.maximum(speeds * factor, 1.0)
         shown = _elapsed(times, speeds)
     near = _without_short_cuts(near, shown)
     counted = np.arange(0.0, shown[-1], 1.0 / fps)
@@ -62,8 +62,7 @@ def storyboard(playback: Playback, fps: float, lapse: float | None = None) -> li
 
 def near_dock(playback: Playback) -> np.ndarray:
     """Whether the dock is looked at, (n,) for the samples of the truth."""
-    last_metres = np.isin(playback.phases, (Phase.FINAL, Phase.DOCKED)) & (playback.ranges < 2.0 * NEAR)
-    return last_metres | (playback.ranges < NEAR)
+    return playback.ranges < NEAR
 
 
 def speed_ups(playback: Playback, near: np.ndarray, lapse: float) -> Array:
@@ -117,7 +116,7 @@ def _without_short_cuts(near: np.ndarray, shown: Array) -> np.ndarray:
     """`near` with the stretches between that are too short to be a shot filled in."""
     filled = near.copy()
     edges = np.flatnonzero(np.diff(near.astype(int)))
-    for leave, come in zip(edges[:-1], edges[1:], strict=True):
+    for leave, come in pairwise(edges):
         if near[leave] and shown[come] - shown[leave] < LEAST_SHOT:
             filled[leave : come + 1] = True
     return filled

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import av
 import matplotlib.image
@@ -29,7 +30,7 @@ from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage, layout
 from auvsim.video.storyboard import DOCKING, HOLD, LONGEST, RAMP, Frame, storyboard
 
-SMALL = {"width": 320, "height": 240}
+SMALL: dict[str, Any] = {"width": 320, "height": 240}
 
 
 @pytest.fixture(scope="module")
