@@ -42,10 +42,18 @@ class Dock:
 
 @dataclass(frozen=True, kw_only=True)
 class Video:
-    """Draws docking.mp4 beside a log."""
+    """Draws docking.mp4 beside a log, or one picture of it."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
     """Log of a trial."""
+    camera: tuple[str, ...] = ()
+    """Up to three of overview, follow, above, dock: the main view and those beside it, throughout."""
+    speed: float | None = None
+    """Speed-up far from the dock; by default such that the video lasts less than a minute."""
+    still: Path | None = None
+    """Draw only this picture (PNG), of the moment before the nose comes nearest to the mouth or of --time."""
+    time: float | None = None
+    """Time of that picture [s]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +126,19 @@ def _run(arguments: list[str]) -> int:
 
     from auvsim.cli import products
 
-    return products.again(command.log, type(command).__name__.lower())
+    match command:
+        case Video(still=None):
+            if command.time is not None:
+                raise InputError("command line: --time goes with --still")
+            return products.again(command.log, products.video, speed=command.speed, cameras=command.camera)
+        case Video():
+            return products.again(
+                command.log, products.still, path=command.still, time=command.time, cameras=command.camera
+            )
+        case Plot():
+            return products.again(command.log, products.plots)
+        case Metrics():
+            return products.again(command.log, products.show_summary)
 
 
 def _parse(arguments: list[str]) -> Command:

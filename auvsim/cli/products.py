@@ -1,6 +1,7 @@
 """What a log is turned into: plots, video and summary, each written whole or not at all."""
 
 import json
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ def plots(log: TrialLog, folder: Path) -> None:
             draw(log, partial)
 
 
-def video(log: TrialLog, folder: Path) -> None:
+def video(log: TrialLog, folder: Path, *, speed: float | None = None, cameras: Sequence[str] = ()) -> None:
     """Draws docking.mp4, with a progress bar.
 
     Raises:
@@ -30,7 +31,18 @@ def video(log: TrialLog, folder: Path) -> None:
     from auvsim.cli.report import VideoProgress
 
     with VideoProgress() as progress, whole(folder / "docking.mp4") as partial:
-        video.render(log, partial, progress=progress)
+        video.render(log, partial, speed=speed, cameras=cameras, progress=progress)
+
+
+def still(log: TrialLog, folder: Path, *, path: Path, time: float | None = None, cameras: Sequence[str] = ()) -> None:
+    """Draws one picture, wherever it is to be.
+
+    Raises:
+        DrawingError: Without OpenGL.
+    """
+    from auvsim import video
+
+    video.still(log, path, time, cameras=cameras)
 
 
 def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
@@ -43,20 +55,20 @@ def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
     return values
 
 
-def again(path: Path, what: str) -> int:
-    """Makes the video, the plots or the metrics of a log again, beside it."""
+def show_summary(log: TrialLog, folder: Path) -> None:
+    """Writes summary.json and prints it as a table."""
+    from auvsim.cli.report import table
+
+    table(summary(log, folder))
+
+
+def again(path: Path, make: Callable[..., None], /, **options: Any) -> int:
+    """Makes something of a log again, beside it: calls `make(log, folder, **options)`."""
     if path.is_dir():
         path = path / "trial.nc"
     log = read(path)
     try:
-        if what == "video":
-            video(log, path.parent)
-        elif what == "plot":
-            plots(log, path.parent)
-        else:
-            from auvsim.cli.report import table
-
-            table(summary(log, path.parent))
+        make(log, path.parent, **options)
     except OSError as error:
         raise InputError(f"{path.parent}: cannot be written: {error.strerror or error}") from None
     return 0

@@ -63,7 +63,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     def picture(log, path):
         Path(path).write_bytes(b"picture")
 
-    def render(log, path, progress=None):
+    def render(log, path, *, speed=None, cameras=(), progress=None):
         Path(path).write_bytes(b"half")
         if not recorder.opengl:
             raise DrawingError("no OpenGL")
@@ -165,7 +165,7 @@ def test_interrupted_while_drawing(
 ) -> None:
     """What was finished stays, what was begun goes."""
 
-    def interrupt(log, path, progress=None):
+    def interrupt(log, path, **options):
         Path(path).write_bytes(b"half")
         raise KeyboardInterrupt
 
@@ -406,3 +406,23 @@ def test_progress_does_not_slow_the_trial() -> None:
                 progress(state)
             times.append(time.perf_counter() - start)
     assert np.min(times) < 1000 * 20e-6  # a control tick may cost 100 microseconds in all; 1 is usual here
+
+
+def test_video_options_reach_the_drawing(
+    stand_in: Recorder, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    """Cameras and speed for the video, a time for the still; a time alone is refused."""
+    asked: list[tuple] = []
+    drawing = sys.modules["auvsim.video"]
+    monkeypatch.setattr(drawing, "render", lambda log, path, **options: asked.append(("render", options)))
+    monkeypatch.setattr(
+        drawing, "still", lambda log, path, time, **options: asked.append(("still", path, time, options)), raising=False
+    )
+    assert cli.main(["dock", "--no-video", "--out", str(tmp_path)]) == 0
+    log = str(tmp_path / "trial.nc")
+    cli.main(["video", log, "--camera", "dock", "follow", "--speed", "10"])
+    assert cli.main(["video", log, "--still", str(tmp_path / "one.png"), "--time", "12"]) == 0
+    assert asked[0][1]["cameras"] == ("dock", "follow")
+    assert asked[0][1]["speed"] == 10.0
+    assert asked[1] == ("still", tmp_path / "one.png", 12.0, {"cameras": ()})
+    assert "--still" in fails(capsys, "video", log, "--time", "12")
