@@ -425,4 +425,5 @@ def test_video_options_reach_the_drawing(
     assert asked[0][1]["cameras"] == ("dock", "follow")
     assert asked[0][1]["speed"] == 10.0
     assert asked[1] == ("still", tmp_path / "one.png", 12.0, {"cameras": ()})
+    capsys.readouterr()
     assert "--still" in fails(capsys, "video", log, "--time", "12")
