@@ -18,9 +18,17 @@ class ControlSettings(Settings):
     yaw_rate_gain: float = Field(default=2.5, ge=0, description="rudder per yaw rate [s]")
     pitch_gain: float = Field(default=2.5, gt=0, description="stern plane per pitch error [rad/rad]")
     pitch_rate_gain: float = Field(default=2.0, ge=0, description="stern plane per pitch rate [s]")
+    astern_factor: float = Field(
+        default=5.0,
+        gt=0,
+        description="factor on the rudder's gains astern, where a hull with its fins ahead is unstable",
+    )
     depth_gain: float = Field(default=0.12, gt=0, description="pitch per depth error [rad/m]")
     depth_integral_gain: float = Field(default=0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
     pitch_limit_deg: float = Field(default=20.0, gt=0, le=45, description="largest commanded pitch [deg]")
+
+
+WAY = 5.0  # time in which the speed through the water follows a command, roughly [s]
 
 
 class _Smoother:
@@ -76,6 +84,7 @@ class Autopilot:
         self._heading, self._pitch = _Smoother(0.03, True), _Smoother(0.03, True)
         self._depth = _Smoother(0.004, False)
         self._integral = 0.0
+        self._way: float | None = None  # speed through the water, by dead reckoning from the commands [m/s]
         self._shaft: tuple[float, float] = (math.nan, 0.0)  # the last speed and its shaft speed
 
     def observe(self, readings: Sequence[Reading]) -> None:
@@ -100,6 +109,7 @@ class Autopilot:
     def command(self, heading: float, depth: float, speed: float) -> Commands:
         """Actuator commands for a heading [rad], a depth [m] and a speed through the water [m/s], negative astern."""
         s, shaft_speed = self._settings, self._shaft_speed(speed)
+        self._way = speed if self._way is None else self._way + (speed - self._way) * self._period / WAY
         if self._heading.value is None or self._pitch.value is None or self._depth.value is None:
             return Commands(0.0, 0.0, shaft_speed)
         rudder = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
@@ -108,10 +118,10 @@ class Autopilot:
         pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
         # Positive stern plane dives. The integral stands still while pitch is limited or the vehicle is far off.
         elevator = s.pitch_gain * (self._pitch.value - pitch) + s.pitch_rate_gain * self._pitch.rate
-        if abs(error) < 1.0 and pitch == wanted:
+        if abs(error) < 0.5 and pitch == wanted:
             self._integral += error * self._period
-        if speed < 0.0:  # fins act the other way round when the flow comes from astern
-            rudder, elevator = -rudder, -elevator
+        if self._way < 0.0:  # fins act the other way round when the flow comes from astern
+            rudder, elevator = -s.astern_factor * rudder, -elevator
         limit = self._fin_limit
         return Commands(max(-limit, min(limit, rudder)), max(-limit, min(limit, elevator)), shaft_speed)
 

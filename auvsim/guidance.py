@@ -19,6 +19,12 @@ from auvsim.navigation import Estimate
 from auvsim.sensors.reading import Reading
 from auvsim.settings import Settings
 
+CLEAR = 4.0  # distance that the go-around keeps from the entrance [m]
+BESIDE = 3.0  # distance from the axis at which the vehicle would pass the dock [m]
+BACKING = 60.0  # longest time of backing out [s]
+ABEAM = (-5.0, 40.0)  # the way round the dock: along the axis and to either side of it [m]
+BEFORE = 40.0  # distance before the entrance from which nothing is in the way to a gate [m]
+
 
 class Phase(IntEnum):
     """Phases of a docking trial, as logged."""
@@ -40,6 +46,9 @@ class GuidanceSettings(Settings):
     gate_distance: float = Field(default=200.0, gt=0, description="distance of the gate before the entrance [m]")
     gate_radius: float = Field(default=20.0, gt=0, description="distance at which the gate counts as reached [m]")
     retry_distance: float = Field(default=100.0, gt=0, description="distance of the gate of later attempts [m]")
+    turning_radius: float = Field(
+        default=16.0, gt=0, description="of the tightest turn, for the room to turn round before the dock [m]"
+    )
     lookahead: float = Field(default=7.0, gt=0, description="lookahead of the line of sight [m]")
     heading_limit_deg: float = Field(
         default=20.0,
@@ -49,17 +58,13 @@ class GuidanceSettings(Settings):
     )
     final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
     attempts: int = Field(default=3, ge=1, description="attempts before the vehicle gives up")
-    fix_timeout: float = Field(
-        default=30.0, gt=0, description="time without a fix after which an approach is broken off [s]"
-    )
+    fix_timeout: float = Field(default=30.0, gt=0, description="time without a fix that breaks an approach off [s]")
     uncertain_timeout: float = Field(
         default=10.0,
         gt=0,
         description="time with an off-axis deviation above the mouth's radius after which it is broken off [s]",
     )
-    lost_timeout: float = Field(
-        default=180.0, gt=0, description="time without a fix after which the vehicle gives up [s]"
-    )
+    lost_timeout: float = Field(default=180.0, gt=0, description="time without a fix that ends the trial [s]")
 
 
 class Command(NamedTuple):
@@ -130,8 +135,10 @@ class Guidance:
         self._last_fix = 0.0
         self._certain = 0.0  # when the position across the axis was last known better than the mouth's radius
         self._hold: tuple[float, float] | None = None  # heading and depth held in search
-        self._side = 1.0
-        self._leg = 0
+        self._north = self._east = math.nan  # of the nose [m]
+        self._current = (0.0, 0.0)  # north, east [m/s]
+        self._side = 1.0  # on which the dock is passed: 1 to starboard of its axis
+        self._leg = 1  # of the way to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
         self._phase_start = 0.0
 
     @property
@@ -181,17 +188,19 @@ class Guidance:
             return Command(heading, depth, 0.0)
         if estimate is None or not estimate.initialised or not self._fixes:
             return Command(*self._hold, self._s.approach_speed)
+        self._locate(time, estimate, heading)
         if self.phase == Phase.SEARCH:
             self._enter(Phase.HOMING, time, "first fix")
-        north, east, current = self._nose(time, estimate, heading)
+            self._side = math.copysign(1.0, self.cross)
         if self.phase == Phase.HOMING:
-            return self._home(time, north, east, current)
+            return self._to_gate(time, -self._s.gate_distance, 0.0)
         if self.phase == Phase.GO_AROUND:
-            return self._go_around(time, north, east, current)
-        return self._approach(time, estimate, silence, north, east, heading, current)
+            return self._go_around(time, wrap(heading - self.axis))
+        reason = self._reason_to_break_off(time, estimate, silence)
+        return self._break_off(time, reason, wrap(heading - self.axis)) if reason else self._follow_line()
 
-    def _nose(self, time: float, estimate: Estimate, heading: float) -> tuple[float, float, tuple[float, float]]:
-        """The nose now (north, east) by dead reckoning from the last estimate, and the current."""
+    def _locate(self, time: float, estimate: Estimate, heading: float) -> None:
+        """The nose now, by dead reckoning from the last estimate."""
         u, v, _ = estimate.velocity.tolist()
         current_north, current_east = estimate.current.tolist()
         cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
@@ -200,54 +209,49 @@ class Guidance:
         axis = self.axis
         self.along = north * math.cos(axis) + east * math.sin(axis)
         self.cross = east * math.cos(axis) - north * math.sin(axis)
-        return north, east, (current_north, current_east)
+        self._north, self._east, self._current = north, east, (current_north, current_east)
 
     def _enter(self, phase: Phase, time: float, reason: str) -> None:
         self.events.append(Event(time, phase.name.lower(), reason))
         self.phase, self._phase_start = phase, time
 
-    def _to(self, x: float, y: float, north: float, east: float, speed: float, current: tuple[float, float]) -> Command:
+    def _to(self, x: float, y: float) -> Command:
         """Straight to a point of the dock frame, crabbing against the current."""
-        axis = self.axis
+        axis, speed = self.axis, self._s.homing_speed
         target_north = x * math.cos(axis) - y * math.sin(axis)
         target_east = x * math.sin(axis) + y * math.cos(axis)
-        course = math.atan2(target_east - east, target_north - north)
-        return Command(heading_for_course(course, speed, current), self.dock_depth, speed)
+        course = math.atan2(target_east - self._east, target_north - self._north)
+        return Command(heading_for_course(course, speed, self._current), self.dock_depth, speed)
 
-    def _home(self, time: float, north: float, east: float, current: tuple[float, float]) -> Command:
-        s = self._s
-        if math.hypot(self.along + s.gate_distance, self.cross) < s.gate_radius:
+    def _to_gate(self, time: float, x: float, y: float) -> Command:
+        """To a gate of the dock frame, from beside or behind the dock first round it."""
+        abeam_x, abeam_y = ABEAM[0], self._side * ABEAM[1]
+        if self.along < -BEFORE or math.hypot(self.along - abeam_x, self.cross - abeam_y) < 15.0:
+            self._leg = 2
+        if self._leg == 1:
+            return self._to(abeam_x, abeam_y)
+        if math.hypot(self.along - x, self.cross - y) < self._s.gate_radius:
             self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
-        return self._to(-s.gate_distance, 0.0, north, east, s.homing_speed, current)
+        return self._to(x, y)
 
-    def _approach(
-        self,
-        time: float,
-        estimate: Estimate,
-        silence: float,
-        north: float,
-        east: float,
-        heading: float,
-        current: tuple[float, float],
-    ) -> Command:
-        s, axis = self._s, self.axis
-        c, cos, sin = estimate.covariance, math.cos(axis), math.sin(axis)
+    def _follow_line(self) -> Command:
+        """Along the approach line, by line of sight."""
+        speed = self._s.approach_speed
+        line = approach_course(self.axis, speed, self._current, self._limit)
+        # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
+        error = self._east * math.cos(line) - self._north * math.sin(line)
+        course = line - math.atan2(error, self._s.lookahead)
+        return Command(heading_for_course(course, speed, self._current), self.dock_depth, speed)
+
+    def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
+        """What is wrong with this attempt; enters the last metres when they begin."""
+        s, g = self._s, self._g
+        c, cos, sin = estimate.covariance, math.cos(self.axis), math.sin(self.axis)
         variance = sin * sin * c[0, 0] - 2 * sin * cos * c[0, 1] + cos * cos * c[1, 1]  # across the axis
-        if variance <= self._g.mouth_radius**2:
+        if variance <= g.mouth_radius**2:
             self._certain = time
         if self.phase == Phase.APPROACH and self.along > -s.final_distance:
             self._enter(Phase.FINAL, time, f"{-self.along:.0f} m before the entrance, {self.cross:+.2f} m off the axis")
-        reason = self._reason_to_break_off(time, silence)
-        if reason:
-            return self._break_off(time, reason, north, east, current)
-        line = approach_course(axis, s.approach_speed, current, self._limit)
-        # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
-        error = east * math.cos(line) - north * math.sin(line)
-        course = line - math.atan2(error, s.lookahead)
-        return Command(heading_for_course(course, s.approach_speed, current), self.dock_depth, s.approach_speed)
-
-    def _reason_to_break_off(self, time: float, silence: float) -> str | None:
-        s, g = self._s, self._g
         if silence > s.fix_timeout:
             return f"no fix for {silence:.0f} s"
         if self.phase != Phase.FINAL:
@@ -263,29 +267,34 @@ class Guidance:
             return f"not captured within {patience:.0f} s of the last metres"
         return None
 
-    def _break_off(self, time: float, reason: str, north: float, east: float, current: tuple[float, float]) -> Command:
+    def _break_off(self, time: float, reason: str, off: float) -> Command:
+        """Ends an attempt at a heading `off` the axis [rad]."""
         if self.attempt >= self._s.attempts:
             self._enter(Phase.ABORTED, time, f"{reason}; attempt {self.attempt} was the last")
             return Command(self.axis, self.dock_depth, 0.0)
         self.attempt += 1
         self._side = math.copysign(1.0, self.cross)
         self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} follows")
-        # In or before the funnel back out first; beside or behind it, or far off, go round at once.
-        self._leg = 0 if -4.0 < self.along < self._g.latched + 0.5 and abs(self.cross) < 2.0 else 1
-        return self._go_around(time, north, east, current)
+        # In or close before the funnel back out first; beside or behind it, or far off, go round at once.
+        room = -CLEAR - self._s.turning_radius
+        self._leg = 0 if room < self.along < self._g.latched + 0.5 and abs(self.cross) < BESIDE else 1
+        return self._go_around(time, off)
 
-    def _go_around(self, time: float, north: float, east: float, current: tuple[float, float]) -> Command:
-        """Back out of the funnel, then sideways clear of the dock, then to a gate abeam of the axis."""
+    def _go_around(self, time: float, off: float) -> Command:
+        """Back out of the funnel, then round to a gate abeam of the axis."""
         s = self._s
         if self._leg == 0:
-            if time - self._phase_start < 20.0 and self.along > -8.0:
+            if time - self._phase_start < BACKING and not self._has_room(off):
                 return Command(self.axis, self.dock_depth, -0.8 * s.approach_speed)
             self._leg = 1
-        beside = 40.0 * self._side
-        if self._leg == 1 and (self.along < -40.0 or math.hypot(self.along + 5.0, self.cross - beside) < 15.0):
-            self._leg = 2
-        if self._leg == 1:
-            return self._to(-5.0, beside, north, east, s.homing_speed, current)
-        if math.hypot(self.along + s.retry_distance, self.cross - 0.5 * beside) < s.gate_radius:
-            self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
-        return self._to(-s.retry_distance, 0.5 * beside, north, east, s.homing_speed, current)
+        return self._to_gate(time, -s.retry_distance, 0.5 * self._side * ABEAM[1])
+
+    def _has_room(self, off: float) -> bool:
+        """Whether a vehicle at a heading `off` the axis [rad] can turn before the dock, and to which side.
+
+        A torpedo cannot be steered astern for long: the farther it has turned off, the less room it needs.
+        """
+        radius = self._s.turning_radius
+        self._side = math.copysign(1.0, self.cross + radius * math.sin(off))
+        turned = max(-math.pi / 2, min(math.pi / 2, self._side * off))
+        return abs(self.cross) > radius or self.along < -CLEAR - radius * (1.0 - math.sin(turned))

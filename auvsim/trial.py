@@ -55,7 +55,8 @@ def run_trial(
     loop = Loop(plan, seed, trial)
     status = "complete"
     try:
-        while loop.time < plan.duration and not loop.over:
+        last = math.ceil(plan.duration * plan.rates.control - 1e-6)
+        while loop.ticks < last and not loop.over:
             loop.step()
             if progress and loop.ticks % loop.progress_ticks == 0:
                 progress(loop.progress())
@@ -138,7 +139,8 @@ class Loop:
         self.guidance.observe(readings)
         self.autopilot.observe(readings)
         self._since_update += readings
-        if self.ticks % self._filter_ticks == 0:
+        # In the latch nothing is to be estimated: the vehicle is where the dock is, and does not move as it believes.
+        if self.ticks % self._filter_ticks == 0 and self.guidance.phase != Phase.DOCKED:
             self._navigate()
         self._act()
         if self.ticks % self._log_ticks == 0:

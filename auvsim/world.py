@@ -214,13 +214,18 @@ class World:
         self.model.opt.disableflags = self._flags if near else self._flags | mujoco.mjtDisableBit.mjDSBL_CONTACT
         if near:
             for _ in range(ticks):
-                mujoco.mj_step(self.model, self.data)
+                self._step(1)
                 self._watch()
         else:
-            mujoco.mj_step(self.model, self.data, ticks)
+            self._step(ticks)
         energy = float(self.data.qvel @ self.data.qvel)
         if not energy < 1e6:
             raise DivergenceError(self._diagnosis())
+
+    def _step(self, ticks: int) -> None:
+        mujoco.mj_step(self.model, self.data, ticks)
+        step = self.model.opt.timestep
+        self.data.time = round(self.data.time / step) * step  # MuJoCo adds steps up, and with them their rounding
 
     def _watch(self) -> None:
         """Records contact and closes the latch when the nose is in the throat."""
