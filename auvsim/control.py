@@ -21,7 +21,7 @@ class ControlSettings(Settings):
     astern_factor: float = Field(
         default=5.0,
         gt=0,
-        description="factor on the rudder's gains astern, where a hull with its fins ahead is unstable",
+        description="factor on the rudder's gains astern, where a hull with its fins ahead is unstable [-]",
     )
     depth_gain: float = Field(default=0.12, gt=0, description="pitch per depth error [rad/m]")
     depth_integral_gain: float = Field(default=0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
