@@ -8,10 +8,10 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 LINES = """
-    renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings currents forces
-    layout fluid hydrodynamics allocation library condense scenery world planar_world acoustics sensors navigation guidance control
-    scenario sampling netcdf log dock_frame recorder trial environment metrics drawing plots video export
-    identification campaign reproduce cli
+    renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings
+    currents forces layout fluid hydrodynamics allocation library condense scenery world planar_world acoustics
+    sensors navigation guidance control scenario sampling netcdf log dock_frame recorder trial environment
+    metrics drawing plots video export identification campaign reproduce cli
 """
 ORDER = LINES.split()
 MAY_IMPORT_ESTIMATORS = ("condense", "planar_world", "navigation", "metrics", "plots", "identification", "reproduce")
