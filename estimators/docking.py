@@ -1,116 +1,57 @@
 """Navigation of a vehicle that a dock locates acoustically: Qiu and Li (2019), a USBL-based method for homing.
 
 The dock measures the transponder in its own frame and sends it by modem, with its attitude: every fix is old when it
-arrives. Eq. 7 (into the world) and eq. 11 (the current) are here. World axes are (north, east) throughout.
+arrives. Eq. 7 (into the world) is in `usbl`, eq. 11 (the current) here. World axes are (north, east) throughout.
 """
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from estimators import ekf
+from estimators import ekf, smoothing
 from estimators.augmented import AugmentedFilter
+from estimators.ekf import Innovation
 from estimators.errors import ParameterError
 from estimators.history import Filter, History, Input, Node
+from estimators.interacting import InteractingFilter
 from estimators.loops import wrap
 from estimators.planar_filter import (
     COMPASS,
+    INTERACTING_NOISE,
     PAPER_NOISE,
     REFERENCE_NOISE,
+    REGULAR_NOISE,
+    ROBUST_NOISE,
     USBL,
+    Bias,
     DockingNoise,
-    HeadingModel,
-    PositionModel,
-    first_belief,
+    PlanarModels,
 )
-from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
+from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters
 from estimators.types import Array, Gaussian, Measurement
+from estimators.usbl import UsblFix, UsblModel, horizontal_rotation
 
 __all__ = [
+    "INTERACTING_NOISE",
     "PAPER_NOISE",
     "REFERENCE_NOISE",
+    "REGULAR_NOISE",
+    "ROBUST_NOISE",
     "AugmentedFilter",
+    "Bias",
     "DockingEstimate",
     "DockingEstimator",
     "DockingNoise",
+    "InteractingFilter",
     "PaperFilter",
     "UsblFix",
     "UsblModel",
     "estimate_current",
+    "horizontal_rotation",
 ]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class UsblFix:
-    """One packet of the dock."""
-
-    stamp: float  # when the transponder was measured [s]
-    received: float  # when the packet arrived [s]
-    position: (
-        tuple[float, float, float] | Array
-    )  # transponder from transceiver in the dock's frame, forward, starboard, down [m]
-    heading: float  # dock's attitude, ZYX [rad]
-    pitch: float = 0.0  # [rad]
-    roll: float = 0.0  # [rad]
-    sequence: int | None = None  # packet number
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class UsblModel:
-    """What the vehicle believes of the dock's USBL.
-
-    The deviations are those of the paper's Table 1 (square roots of its variances), interpolated on logarithmic axes
-    and constant outside; they follow no power law.
-    """
-
-    transceiver: tuple[float, float, float] = (0.0, 0.0, 0.0)  # its place in the dock's frame [m]
-    ranges: tuple[float, ...] = (12.0, 40.0, 100.0, 200.0)  # [m]
-    deviations: tuple[float, ...] = (0.0067, 0.0678, 0.3390, 0.4807)  # of each axis at these ranges [m]
-    dock_heading: float = 0.0  # standard deviation of the dock's compass, which acts across the line of sight [rad]
-
-    def __post_init__(self) -> None:
-        increasing = all(a < b for a, b in zip(self.ranges, self.ranges[1:], strict=False))
-        if not (
-            increasing and len(self.ranges) == len(self.deviations) and min((*self.ranges, *self.deviations)) > 0.0
-        ):
-            raise ParameterError(f"USBL ranges {self.ranges} must rise, with one deviation > 0 each: {self.deviations}")
-
-    def deviation(self, distance: float) -> float:
-        """Standard deviation of each axis [m] at a distance [m]."""
-        if not distance > self.ranges[0]:
-            return self.deviations[0]
-        return math.exp(float(np.interp(math.log(distance), np.log(self.ranges), np.log(self.deviations))))
-
-    def world_fix(self, fix: UsblFix) -> Measurement:
-        """Transponder (north, east) from the dock's origin by eq. 7, with covariance M Sigma M'."""
-        numbers = (*map(float, fix.position), fix.heading, fix.pitch, fix.roll)
-        if not all(map(math.isfinite, numbers)):
-            numbers = (math.nan,) * 6  # for the history to refuse: the cosine of infinity would raise here
-        x, y, z, *attitude = numbers
-        M = horizontal_rotation(*attitude)
-        value = M @ (np.array((x, y, z)) + self.transceiver)
-        variance = self.deviation(math.sqrt(x * x + y * y + z * z)) ** 2
-        covariance = variance * (M @ M.T)
-        if self.dock_heading > 0.0:
-            across = np.array((-value[1], value[0])) * self.dock_heading
-            covariance += np.outer(across, across)
-        return Measurement(
-            kind=USBL, value=value, covariance=covariance, stamp=fix.stamp, received=fix.received, sequence=fix.sequence
-        )
-
-
-def horizontal_rotation(heading: float, pitch: float, roll: float) -> Array:
-    """First two rows (2, 3) of the ZYX rotation from the dock's frame to north, east, down; the paper's eq. 7."""
-    cy, sy, cp, sp, cr, sr = (f(a) for a in (heading, pitch, roll) for f in (math.cos, math.sin))
-    return np.array(
-        (
-            (cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr),
-            (sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
-        )
-    )
 
 
 def estimate_current(
@@ -140,6 +81,7 @@ class PaperState(NamedTuple):
     belief: Gaussian
     currents: tuple[tuple[float, float], ...]  # last m estimates, oldest first [m/s]
     last_fix: float  # stamp of the fix before [s]
+    innovation: Innovation | None = None  # of the last fix
     outliers: int = 0  # it has no gate
 
 
@@ -149,12 +91,15 @@ class PaperFilter:
     It has no gate: its covariance does not know the current's error, so that a gate would lock it out. For the same
     reason the position noise is inflated, and its covariance is not consistent.
 
+    Without `weights` the current stays zero: the paper's regular filter, if delays are not compensated either (see
+    `DockingEstimator`), and its half-measure, if they are.
+
     Args:
         parameters: The vehicle.
         noise: What it believes of its noise; that of the current is not used.
-        weights: a_0 .. a_m of eq. 11.
-        transponder, initial_surge: As for `AugmentedFilter`.
-        integrator, max_substep: As there; the paper's are "euler" and its step of 0.5 s.
+        weights: a_0 .. a_m of eq. 11; None leaves the current zero.
+        transponder, initial_surge, integrator, max_substep: See `PlanarModels`; the paper's integrator is "euler" with
+            a step of 0.5 s.
     """
 
     def __init__(
@@ -162,59 +107,62 @@ class PaperFilter:
         parameters: PlanarParameters,
         noise: DockingNoise = PAPER_NOISE,
         *,
-        weights: tuple[float, ...] = (0.3, 0.3, 0.4),
+        weights: tuple[float, ...] | None = (0.3, 0.3, 0.4),
         transponder: tuple[float, float] = (0.0, 0.0),
         initial_surge: float | None = None,
         integrator: Integrator = "midpoint",
         max_substep: float = MAX_SUBSTEP,
     ) -> None:
-        if len(weights) < 2 or min(weights) <= 0.0 or abs(sum(weights) - 1.0) > 1e-9:
+        if weights is not None and (len(weights) < 2 or min(weights) <= 0.0 or abs(sum(weights) - 1.0) > 1e-9):
             raise ParameterError(f"weights {weights} of eq. 11 must be two or more, above 0, of sum 1")
+        # With no covariance, the augmented model is the six-state one with a given current.
         self.parameters = parameters
-        self.noise = noise
-        self._weights = np.array(weights)
-        self._initial_surge = initial_surge
-        densities = noise.densities()
-        densities[6:] = 0.0  # with no covariance either, the augmented model is the six-state one with a given current
-        self._process = PlanarProcess(parameters, densities, integrator=integrator, max_substep=max_substep)
-        self._heading = HeadingModel()
-        self._position = PositionModel(transponder)
+        self.noise = replace(noise, current=0.0, initial_current=0.0, biases={})
+        self._weights = None if weights is None else np.array(weights)
+        self.models = PlanarModels(
+            parameters,
+            self.noise,
+            transponder=transponder,
+            initial_surge=initial_surge,
+            integrator=integrator,
+            max_substep=max_substep,
+        )
 
     def start(self, nodes: Sequence[Node[PaperState]], index: int) -> PaperState | None:
         """State at the first fix, with no current; a second fix at the same node is fused."""
-        first = first_belief(self.parameters, self.noise, self._position, nodes, index, self._initial_surge)
+        first = self.models.first(nodes, index)
         if first is None:
             return None
         belief, fix = first
-        belief.covariance[6:, :] = belief.covariance[:, 6:] = 0.0
-        state = PaperState(belief, ((0.0, 0.0),) * (len(self._weights) - 1), fix.stamp)
+        memory = 0 if self._weights is None else len(self._weights) - 1
+        state = PaperState(belief, ((0.0, 0.0),) * memory, fix.stamp)
         others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
         return self.correct(state, nodes[index].time, others)
 
     def predict(self, state: PaperState, u: Input, duration: float) -> PaperState:
         """State after `duration` [s]; eq. 12."""
-        belief = ekf.predict(state.belief, self._process, u, duration)
-        return PaperState(belief, state.currents, state.last_fix)
+        belief = ekf.predict(state.belief, self.models.process, u, duration)
+        return PaperState(belief, state.currents, state.last_fix, state.innovation)
 
     def correct(self, state: PaperState, node_time: float, measurements: Sequence[Measurement]) -> PaperState:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                belief, _ = ekf.correct(state.belief, measurement, self._heading)
-                state = PaperState(belief, state.currents, state.last_fix)
+                belief, _ = ekf.correct(state.belief, measurement, self.models.heading)
+                state = PaperState(belief, state.currents, state.last_fix, state.innovation)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)
         return state
 
     def _fuse_fix(self, state: PaperState, fix: Measurement) -> PaperState:
-        belief, innovation = ekf.correct(state.belief, fix, self._position)
+        belief, innovation = ekf.correct(state.belief, fix, self.models.position)
         interval = fix.stamp - state.last_fix
-        if abs(interval) < 1e-6:
-            return state._replace(belief=belief)
+        if self._weights is None or abs(interval) < 1e-6:
+            return state._replace(belief=belief, innovation=innovation)
         gain = innovation.gain[:2, :2]
         current = estimate_current(state.currents, self._weights, gain, innovation.residual, interval)
         belief.mean[6:] = current
-        return PaperState(belief, (*state.currents[1:], current), fix.stamp)
+        return PaperState(belief, (*state.currents[1:], current), fix.stamp, innovation)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -227,10 +175,15 @@ class DockingEstimate:
     current: Array  # (2,) north, east [m/s]
     initialised: bool
     refused: Mapping[str, int]  # measurements refused so far, by reason; "outlier" by the filter's gate
+    reinitialised: int = 0  # how often the filter had to start anew, because its numbers were no longer finite
+    innovation: Innovation | None = None  # of the latest fix, by stamp, that the filter has seen
 
 
 class DockingFilter(Filter[Any], Protocol):
-    """A filter for a `DockingEstimator`: its states have `belief` (8 states) and `outliers`."""
+    """A filter for a `DockingEstimator`.
+
+    Its states have `belief` (eight states and biases), `outliers` and `innovation`.
+    """
 
     noise: DockingNoise
 
@@ -239,24 +192,53 @@ class DockingEstimator:
     """A docking filter behind its delay buffer: measurements in, in whatever order, estimate out.
 
     Args:
-        filter: `AugmentedFilter`, `PaperFilter`, or one of that form.
+        filter: `AugmentedFilter`, `InteractingFilter`, `PaperFilter`, or one of that form.
         usbl: What is believed of the dock's USBL.
         step: Nominal time between ticks [s].
         keep: Age up to which fixes are used [s].
+        compensate_delay: False takes every fix as made at the tick it arrives at, whatever its stamp or number: the
+            paper's regular filter.
     """
 
     def __init__(
-        self, filter: DockingFilter, usbl: UsblModel | None = None, *, step: float = 0.5, keep: float = 30.0
+        self,
+        filter: DockingFilter,
+        usbl: UsblModel | None = None,
+        *,
+        step: float = 0.5,
+        keep: float = 30.0,
+        compensate_delay: bool = True,
     ) -> None:
         self._filter = filter
         self._usbl = usbl or UsblModel()
         self._step, self._keep = step, keep
+        self._compensate_delay = compensate_delay
         self._compass_covariance = np.array([[filter.noise.compass**2]])
         self.reset()
 
     def reset(self) -> None:
         """Forgets everything, counts included."""
         self._history: History[Any] = History(self._filter, step=self._step, keep=self._keep)
+        self._restarts = 0  # of the filter
+        self._outliers_before = self._outliers = 0  # rejected before its last start, and in all
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """Times [s] and beliefs (all states) of the nodes still kept, given all that arrived since: refined poses.
+
+        Raises:
+            ParameterError: The filter cannot be smoothed: its covariance does not hold the error of the current.
+        """
+        process_after = getattr(self._filter, "process_after", None)
+        if process_after is None:
+            raise ParameterError(f"a {type(self._filter).__name__} cannot be smoothed; an AugmentedFilter can")
+        nodes = self._history.nodes
+        beliefs = smoothing.smooth(nodes, process_after)
+        return [(node.time, belief) for node, belief in zip(nodes[len(nodes) - len(beliefs) :], beliefs, strict=True)]
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """The delay buffer."""
+        return self._history.nodes
 
     def tick(
         self, time: float, heading: float | None, rudder: float, shaft_speed: float, fixes: Sequence[UsblFix] = ()
@@ -272,16 +254,24 @@ class DockingEstimator:
 
         Raises:
             ParameterError: The time does not advance, or an input is not a number.
-            NotFiniteError: The filter diverged.
         """
         u = (float(rudder), float(shaft_speed))
         if not (math.isfinite(u[0]) and math.isfinite(u[1])):
             raise ParameterError(f"rudder {rudder} rad and shaft speed {shaft_speed} rad/s at {time} s must be finite")
         history = self._history
-        compass = () if heading is None else (self._compass(time, float(heading)),)
-        history.append(float(time), u, compass)
+        prompt = [] if heading is None else [self._compass(time, float(heading))]
+        measurements = []
         for fix in fixes:
-            history.insert(self._usbl.world_fix(fix))
+            if self._usbl.reaches(fix):
+                measurements.append(self._usbl.world_fix(fix))
+            else:
+                history.refuse("implausible")
+        if not self._compensate_delay:
+            prompt += [replace(m, stamp=time) for m in measurements]
+            measurements = []
+        history.append(float(time), u, prompt)
+        for measurement in measurements:
+            history.insert(measurement)
         return self._estimate(time, history.replay())
 
     def _compass(self, time: float, heading: float) -> Measurement:
@@ -289,13 +279,19 @@ class DockingEstimator:
         return Measurement(kind=COMPASS, value=value, covariance=self._compass_covariance, stamp=time, received=time)
 
     def _estimate(self, time: float, state: Any) -> DockingEstimate:
-        refused = {**self._history.refused, "outlier": 0 if state is None else state.outliers}
+        history = self._history
+        if history.reinitialised > self._restarts:
+            self._restarts, self._outliers_before = history.reinitialised, self._outliers
+        if state is not None:
+            self._outliers = self._outliers_before + state.outliers
         belief = Gaussian(mean=np.zeros(8), covariance=np.zeros((8, 8))) if state is None else state.belief
         return DockingEstimate(
             time=time,
-            mean=belief.mean,
-            covariance=belief.covariance,
-            current=belief.mean[6:],
+            mean=belief.mean[:8],
+            covariance=belief.covariance[:8, :8],
+            current=belief.mean[6:8],
             initialised=state is not None,
-            refused=refused,
+            refused={**history.refused, "outlier": self._outliers},
+            reinitialised=history.reinitialised,
+            innovation=None if state is None else state.innovation,
         )

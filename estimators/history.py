@@ -14,7 +14,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from estimators import loops
-from estimators.errors import ParameterError
+from estimators.errors import NotFiniteError, NotPositiveDefiniteError, ParameterError
 from estimators.types import Measurement
 
 State = TypeVar("State")
@@ -26,7 +26,7 @@ REFUSALS = ("future", "too_old", "not_finite", "not_positive_definite", "duplica
 class Node(Generic[State]):
     """One instant: what was measured then, the input from then to the next node, and the filter's state after it."""
 
-    __slots__ = ("input", "is_grid", "measurements", "prompt", "state", "time")
+    __slots__ = ("failed", "input", "is_grid", "measurements", "prompt", "state", "time")
 
     def __init__(self, time: float, u: Input, measurements: list[Measurement], is_grid: bool) -> None:
         self.time = time  # [s]
@@ -35,6 +35,7 @@ class Node(Generic[State]):
         self.prompt = len(measurements)  # how many of them, the first ones, were made at the tick and did not come late
         self.is_grid = is_grid  # a tick of the filter, not a time inserted for a measurement
         self.state: State | None = None  # None before the filter has started
+        self.failed = False  # the filter could not go on here and started anew
 
 
 class Filter(Protocol[State]):
@@ -56,6 +57,9 @@ class Filter(Protocol[State]):
 class History(Generic[State]):
     """The delay buffer: grid nodes at the filter's ticks and inserted nodes at the stamps of late measurements.
 
+    Where the filter cannot go on, because its numbers are not finite or its covariance not positive definite, it starts
+    anew at the next node that suffices for it, which is counted as `reinitialised`.
+
     Args:
         filter: What to run over the nodes.
         step: Nominal time between ticks [s]. A late measurement within a tenth of it of a tick belongs to that tick
@@ -72,6 +76,7 @@ class History(Generic[State]):
         self._keep = keep
         self.nodes: list[Node[State]] = []
         self.refused: dict[str, int] = dict.fromkeys(REFUSALS, 0)  # measurements refused so far, by reason
+        self.reinitialised = 0  # how often the filter has failed and started anew
         self._accepted: list[Measurement] = []
         self._touched = 0  # first node whose state is out of date
 
@@ -120,13 +125,26 @@ class History(Generic[State]):
         for index in range(self._touched, len(nodes)):
             node = nodes[index]
             before = nodes[index - 1] if index else None
-            if before is None or before.state is None:
-                node.state = filter.start(nodes, index) if node.measurements else None
-                continue
-            state = filter.predict(before.state, before.input, node.time - before.time)
-            node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
+            try:
+                if before is None or before.state is None:
+                    node.state = filter.start(nodes, index) if node.measurements else None
+                    continue
+                state = filter.predict(before.state, before.input, node.time - before.time)
+                node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
+            except (NotFiniteError, NotPositiveDefiniteError):
+                self._restart(index)
         self._touched = len(nodes)
         return self.state
+
+    def _restart(self, index: int) -> None:
+        """Starts the filter at a node where it failed, or leaves that to a later one; counts each such node once."""
+        node = self.nodes[index]
+        self.reinitialised += not node.failed
+        node.failed = True
+        try:
+            node.state = self._filter.start(self.nodes, index) if node.measurements else None
+        except (NotFiniteError, NotPositiveDefiniteError):
+            node.state = None
 
     def refuse(self, reason: str) -> bool:
         """Counts a refused measurement; always False."""

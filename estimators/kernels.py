@@ -56,7 +56,7 @@ OPERATIONS = {
     ca.OP_IF_ELSE_ZERO: "({1} if {0} != 0.0 else 0.0)",
 }
 
-PREDICT = '''
+KERNELS = '''
 
 @compiled
 def predict(mean, covariance, u, p, q, duration, substeps):
@@ -72,6 +72,30 @@ def predict(mean, covariance, u, p, q, duration, substeps):
     for index in {wrapped}:
         x[index] = wrap(x[index])
     return x, P, is_finite(x, P)
+
+
+@compiled
+def move(points, u, p, duration, substeps):
+    """Carries each of `points` (k, n) on by `duration` with the input held, in place and without wrapping angles."""
+    n = points.shape[1]
+    following, F = np.empty(n), np.empty((n, n))
+    h = duration / substeps
+    for point in points:
+        for _ in range(substeps):
+            step(point, u, p, h, following, F)
+            point[:] = following
+
+
+@compiled
+def walk(start, inputs, p, h, kicks):
+    """States (k + 1, n) from `start`: steps of `h` under `inputs` (k, 2), each followed by its kick (k, n)."""
+    count, n = kicks.shape
+    states, F = np.empty((count + 1, n)), np.empty((n, n))
+    states[0] = start
+    for k in range(count):
+        step(states[k], inputs[k], p, h, states[k + 1], F)
+        states[k + 1] += kicks[k]
+    return states
 '''
 
 
@@ -80,7 +104,8 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
 
     The module has `step(x, u, p, h, x', F)`, which fills its last two arguments (F only where it can differ from zero),
     and `predict(mean, covariance, u, p, q, duration, substeps) -> (mean, covariance, finite)`, where q (n,) holds power
-    spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi].
+    spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi]; and `move` and `walk`
+    for many points and for a long way, see KERNELS.
     """
     loops_hash = hashlib.sha256(inspect.getsource(loops).encode()).hexdigest()[:16]
     source = (
@@ -91,7 +116,7 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
         "from estimators.loops import is_finite, propagate, wrap\n\n\n"
         "@compiled\n"
         + python_source(function, "step", ("x", "u", "p", "h"), ("following", "F"), scalars=("h",))
-        + PREDICT.format(wrapped=repr((*wrapped,)) if wrapped else "range(0)")
+        + KERNELS.format(wrapped=repr((*wrapped,)) if wrapped else "range(0)")
     )
     return load(function.name(), source)
 

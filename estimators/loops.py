@@ -145,3 +145,64 @@ def joseph(covariance, HP, H, K, R):
             P[i, j] = total
             P[j, i] = total
     return P
+
+
+@compiled
+def merge(means, covariances, weights, angles):
+    """Mean (n,) and covariance (n, n) of a mixture of Gaussians (m, n), (m, n, n); `angles` are wrapped states."""
+    m, n = means.shape
+    offsets = means - means[0]
+    for k in range(m):
+        for index in angles:
+            offsets[k, index] = wrap(offsets[k, index])
+    centre = np.zeros(n)
+    for k in range(m):
+        for i in range(n):
+            centre[i] += weights[k] * offsets[k, i]
+    P = np.zeros((n, n))
+    for k in range(m):
+        for i in range(n):
+            a = offsets[k, i] - centre[i]
+            for j in range(i, n):
+                P[i, j] += weights[k] * (covariances[k, i, j] + a * (offsets[k, j] - centre[j]))
+    for i in range(n):
+        for j in range(i):
+            P[i, j] = P[j, i]
+    mean = means[0] + centre
+    for index in angles:
+        mean[index] = wrap(mean[index])
+    return mean, P
+
+
+@compiled
+def sigma_points(mean, covariance, centre):
+    """Points (2n + 1, n), the mean first, their weights, that of the mean `centre`; whether the covariance allows."""
+    n = mean.size
+    L, positive = factor(covariance)
+    share = (1.0 - centre) / (2 * n)
+    points, weights = np.empty((2 * n + 1, n)), np.full(2 * n + 1, share)
+    points[0], weights[0] = mean, centre
+    for k in range(n):
+        for i in range(n):
+            offset = L[i, k] / math.sqrt(2.0 * share)
+            points[1 + k, i] = mean[i] + offset
+            points[1 + n + k, i] = mean[i] - offset
+    return points, weights, positive
+
+
+@compiled
+def moments(points, weights, noise):
+    """Mean (n,) and covariance (n, n) of weighted points (k, n), with that of `noise` added."""
+    k, n = points.shape
+    mean, P = np.zeros(n), noise.copy()
+    for a in range(k):
+        for i in range(n):
+            mean[i] += weights[a] * points[a, i]
+    for a in range(k):
+        for i in range(n):
+            for j in range(i, n):
+                P[i, j] += weights[a] * (points[a, i] - mean[i]) * (points[a, j] - mean[j])
+    for i in range(n):
+        for j in range(i):
+            P[i, j] = P[j, i]
+    return mean, P

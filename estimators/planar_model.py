@@ -1,6 +1,7 @@
 """The planar (surge, sway, yaw) rudder-driven vehicle, defined once in CasADi for filters and identification.
 
-State [north, east, psi, u, v, r], or with the current's [c_n, c_e] appended; u, v are velocities through the water.
+State [north, east, psi, u, v, r], or with the current's [c_n, c_e] appended, and after these the biases a filter may
+estimate besides (BIASES, in that order); u, v are velocities through the water.
 Input (rudder [rad], positive to starboard; shaft speed [rad/s]). SNAME notation; Qiu and Li (2019), coefficients of
 Prestero (2001).
 """
@@ -22,6 +23,12 @@ from estimators.kernels import step_kernels
 from estimators.types import Array
 
 Integrator = Literal["euler", "midpoint"]
+
+# surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: what the vehicle's compass
+# shows too much [rad]; dock_heading: what the dock's compass shows too much [rad]; clock: how much later than its stamp
+# a fix was taken [s].
+BIASES = ("surge", "compass", "dock_heading", "clock")
+Biases = tuple[str, ...]  # a selection, in the order of BIASES
 
 # Velocities beyond these are no motion of such a vehicle but an outlier's kick; the quadratic damping there would make
 # explicit steps of up to MAX_SUBSTEP unstable, so the accelerations are those at the limit.
@@ -122,46 +129,53 @@ def accelerations(nu: ca.SX, rudder: ca.SX, shaft_speed: ca.SX, parameters: ca.S
     return ca.vertcat(X / (p.m - p.X_ud), (m_r * Y - y_r * N) / determinant, (m_v * N - n_v * Y) / determinant)
 
 
-def derivative(x: ca.SX, u: ca.SX, parameters: ca.SX) -> ca.SX:
-    """dx/dt of [north, east, psi, u, v, r] (6,), or (8,) with [c_n, c_e] appended; eq. 1 and 12 of the paper."""
+def derivative(x: ca.SX, u: ca.SX, parameters: ca.SX, biases: Biases = ()) -> ca.SX:
+    """dx/dt of the state, (6,) or (8,) with the current, then the `biases`; eq. 1 and 12 of the paper."""
     psi, surge, sway, r = x[2], x[3], x[4], x[5]
-    current = x[6:8] if x.numel() == 8 else ca.SX(2, 1)
+    current = x[6:8] if x.numel() >= 8 else ca.SX(2, 1)
     north = ca.cos(psi) * surge - ca.sin(psi) * sway + current[0]
     east = ca.sin(psi) * surge + ca.cos(psi) * sway + current[1]
     l = accelerations(x[3:6], u[0], u[1], parameters)
+    if "surge" in biases:
+        l[0] += x[8 + biases.index("surge")]
     return ca.vertcat(north, east, r, l, ca.SX(x.numel() - 6, 1))
 
 
 @lru_cache
-def step_function(*, current: bool = True, integrator: Integrator = "midpoint") -> ca.Function:
-    """One step (x, u, p, h) -> (x', F = dx'/dx) of eight states (with `current`) or six."""
+def step_function(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> ca.Function:
+    """One step (x, u, p, h) -> (x', F = dx'/dx) of six states, of eight (with `current`), or of more with `biases`."""
     if integrator not in ("euler", "midpoint"):
         raise ParameterError(f"no integrator '{integrator}'; there are euler, midpoint")
-    x, u = ca.SX.sym("x", 8 if current else 6), ca.SX.sym("u", 2)
+    if biases != tuple(name for name in BIASES if name in biases) or (biases and not current):
+        raise ParameterError(f"biases {biases} must be some of {BIASES}, in that order, behind a current")
+    x, u = ca.SX.sym("x", 8 + len(biases) if current else 6), ca.SX.sym("u", 2)
     p, h = ca.SX.sym("p", len(PARAMETER_NAMES)), ca.SX.sym("h")
-    slope = derivative(x, u, p)
+    slope = derivative(x, u, p, biases)
     if integrator == "midpoint":
-        slope = derivative(x + h / 2 * slope, u, p)
+        slope = derivative(x + h / 2 * slope, u, p, biases)
     following = x + h * slope
     expressions = ca.cse([following, ca.jacobian(following, x)])
-    return ca.Function(f"planar{x.numel()}_{integrator}", [x, u, p, h], expressions)
+    moving = ("surge",) if "surge" in biases else ()  # the others only stand there: any of them compiles to the same
+    return ca.Function("_".join((f"planar{x.numel()}", *moving, integrator)), [x, u, p, h], expressions)
 
 
 @lru_cache
-def planar_kernels(*, current: bool = True, integrator: Integrator = "midpoint") -> ModuleType:
-    """The compiled `step` and `predict` of `kernels.step_kernels`; they compile at their first call, see `warm`."""
-    return step_kernels(step_function(current=current, integrator=integrator), wrapped=(2,))
+def planar_kernels(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> ModuleType:
+    """The compiled functions of `kernels.step_kernels`; they compile at their first call, see `warm`."""
+    function = step_function(current=current, integrator=integrator, biases=biases)
+    return step_kernels(function, wrapped=(2,))
 
 
-def is_warm(*, current: bool = True, integrator: Integrator = "midpoint") -> bool:
+def is_warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> bool:
     """Whether a filter on this model starts at once; if not, its first use compiles for some seconds."""
-    return is_ready(planar_kernels(current=current, integrator=integrator).predict) and is_ready(loops.correct)
+    kernels = planar_kernels(current=current, integrator=integrator, biases=biases)
+    return is_ready(kernels.predict) and is_ready(loops.correct)
 
 
-def warm(*, current: bool = True, integrator: Integrator = "midpoint") -> None:
+def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> None:
     """Compiles what a filter on this model needs, or loads it from the cache on disk."""
-    n = 8 if current else 6
-    process = PlanarProcess(PRESTERO, np.zeros(n), integrator=integrator)
+    n = 8 + len(biases) if current else 6
+    process = PlanarProcess(PRESTERO, np.zeros(n), integrator=integrator, biases=biases)
     mean, covariance, _ = process.propagate(np.zeros(n), np.eye(n), (0.0, 0.0), 0.1)
     loops.correct(mean, covariance, np.eye(1, n), np.zeros(1), np.eye(1), math.inf)
     loops.wrap(0.0)
@@ -173,9 +187,10 @@ class PlanarProcess:
     Args:
         parameters: The vehicle.
         noise: Power spectral densities of the process noise: (8,) with the current in the state, (6,) without it;
-            [m^2/s, m^2/s, rad^2/s, m^2/s^3, m^2/s^3, rad^2/s^3, m^2/s^3, m^2/s^3].
+            [m^2/s, m^2/s, rad^2/s, m^2/s^3, m^2/s^3, rad^2/s^3, m^2/s^3, m^2/s^3], then one of each bias.
         integrator: "midpoint" or the paper's "euler".
         max_substep: Longest substep [s].
+        biases: Those in the state, of BIASES.
     """
 
     def __init__(
@@ -185,17 +200,20 @@ class PlanarProcess:
         *,
         integrator: Integrator = "midpoint",
         max_substep: float = MAX_SUBSTEP,
+        biases: Biases = (),
     ) -> None:
         self.parameters = parameters
         self.noise = np.array(noise, dtype=float)
-        if self.noise.shape not in ((6,), (8,)) or not (self.noise >= 0.0).all():
-            raise ParameterError(f"process noise {noise} must be 6 or 8 power spectral densities >= 0")
+        sizes = (8 + len(biases),) if biases else (6, 8)
+        if self.noise.ndim != 1 or self.noise.size not in sizes or not (self.noise >= 0.0).all():
+            wanted = " or ".join(map(str, sizes))
+            raise ParameterError(f"process noise {noise} must be {wanted} power spectral densities >= 0")
         self._p = parameters.vector()
         if not np.isfinite(self._p).all():
             raise ParameterError(f"planar parameters must be finite: {parameters}")
         self._max_substep = max_substep
-        self._predict = planar_kernels(current=self.noise.size == 8, integrator=integrator).predict
-        self._step = planar_kernels(current=self.noise.size == 8, integrator=integrator).step
+        kernels = planar_kernels(current=self.noise.size >= 8, integrator=integrator, biases=biases)
+        self._predict, self._step, self._move, self._walk = kernels.predict, kernels.step, kernels.move, kernels.walk
 
     def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """State after `dt` [s] with the input (rudder [rad], shaft speed [rad/s]) held."""
@@ -226,6 +244,29 @@ class PlanarProcess:
         if not finite:
             raise NotFiniteError(f"prediction over {dt:g} s from {mean} with input {u} is not finite")
         return x, P, substeps
+
+    def move(self, points: Array, u: Sequence[float], dt: float) -> Array:
+        """States (k, n) after `dt` with the input held, each from one of `points` (k, n); angles are not wrapped."""
+        moved = np.array(points, dtype=float)
+        self._move(moved, (float(u[0]), float(u[1])), self._p, dt, self._substeps(dt))
+        return moved
+
+    def wrap_angles(self, mean: Array) -> Array:
+        """The same state with its heading in (-pi, pi]."""
+        wrapped = mean.copy()
+        wrapped[2] = loops.wrap(wrapped[2])
+        return wrapped
+
+    def walk(self, start: Array, inputs: Array, step: float, kicks: Array) -> Array:
+        """A sampled trajectory (k + 1, n) in steps of `step` [s]; angles are not wrapped.
+
+        Args:
+            start: First state (n,).
+            inputs: Input during each step (k, 2).
+            step: Its length [s], without substeps.
+            kicks: Noise added after each step (k, n).
+        """
+        return self._walk(np.array(start, dtype=float), np.array(inputs, dtype=float), self._p, step, kicks)
 
     def _substeps(self, dt: float) -> int:
         return max(1, math.ceil(dt / self._max_substep - 1e-9))

@@ -1,0 +1,131 @@
+"""Time of one node, predict and correct of eight states, beside other libraries doing the same work in the same run.
+
+Run with `pytest tests/benchmarks/test_estimator_speed.py --benchmark-enable`; times are printed, not judged. The others
+(`pip install auvsim[compare]`) are handed the same compiled model, so that only the filters themselves are compared.
+"""
+
+from datetime import datetime, timedelta
+
+import numpy as np
+import pytest
+
+from auvsim.reproduce.paper1_runs import Conditions, simulate, track
+from auvsim.reproduce.paper1_study import FILTERS
+from estimators import ekf
+from estimators.planar_filter import REFERENCE_NOISE, HeadingModel
+from estimators.planar_model import PRESTERO, PlanarProcess
+from estimators.types import Gaussian, Measurement
+
+PROCESS, HEADING = PlanarProcess(PRESTERO, REFERENCE_NOISE.densities()), HeadingModel()
+MEAN = np.array([3.0, -7.0, 0.4, 0.9, -0.06, 0.05, 0.2, -0.3])
+INPUT, STEP = (0.08, 0.0), 0.5
+VARIANCE = REFERENCE_NOISE.compass**2
+SAMPLE = Measurement(
+    kind="compass", value=np.array([0.43]), covariance=np.array([[VARIANCE]]), stamp=STEP, received=STEP
+)
+
+
+def covariance():
+    root = np.random.default_rng(0).standard_normal((8, 8))
+    return 0.01 * (root @ root.T)
+
+
+def node(belief):
+    predicted = ekf.predict(belief, PROCESS, INPUT, STEP)
+    return ekf.correct(predicted, SAMPLE, HEADING)[0]
+
+
+def expected():
+    after = node(Gaussian(mean=MEAN, covariance=covariance()))
+    return after.mean, after.covariance
+
+
+def agrees(mean, P):
+    # Rounding: other orders of the same operations on elements of order 1.
+    assert mean == pytest.approx(expected()[0], rel=1e-9, abs=1e-9)
+    assert pytest.approx(expected()[1], rel=1e-8, abs=1e-10) == P
+
+
+def test_node_here(benchmark):
+    belief = Gaussian(mean=MEAN, covariance=covariance())
+    after = benchmark(node, belief)
+    agrees(after.mean, after.covariance)
+
+
+def test_node_in_filterpy(benchmark):
+    kalman = pytest.importorskip("filterpy.kalman")
+
+    class Planar(kalman.ExtendedKalmanFilter):
+        def predict_x(self, u=0):
+            self.x = PROCESS.evaluate(self.x, u, STEP)
+
+    other = Planar(dim_x=8, dim_z=1)
+    H = HEADING.jacobian(MEAN)
+
+    def other_node():
+        other.x, other.P = MEAN, covariance_at_start
+        other.F, other.Q = PROCESS.jacobian(MEAN, INPUT, STEP), PROCESS.covariance(MEAN, INPUT, STEP)
+        other.predict(INPUT)
+        other.update(SAMPLE.value, lambda x: H, HEADING.evaluate, R=SAMPLE.covariance, residual=HEADING.residual)
+
+    covariance_at_start = covariance()
+    benchmark(other_node)
+    agrees(other.x, other.P)
+
+
+def test_node_in_stone_soup(benchmark):
+    pytest.importorskip("stonesoup")
+    from stonesoup.models.measurement.linear import LinearGaussian
+    from stonesoup.models.transition.base import TransitionModel
+    from stonesoup.predictor.kalman import ExtendedKalmanPredictor
+    from stonesoup.types.array import CovarianceMatrix, StateVector
+    from stonesoup.types.detection import Detection
+    from stonesoup.types.hypothesis import SingleHypothesis
+    from stonesoup.types.state import GaussianState
+    from stonesoup.updater.kalman import ExtendedKalmanUpdater
+
+    class Planar(TransitionModel):
+        @property
+        def ndim_state(self):
+            return 8
+
+        def function(self, state, **kwargs):
+            return StateVector(PROCESS.evaluate(flat(state), INPUT, STEP))
+
+        def jacobian(self, state, **kwargs):
+            return PROCESS.jacobian(flat(state), INPUT, STEP)
+
+        def covar(self, **kwargs):
+            return CovarianceMatrix(PROCESS.covariance(MEAN, INPUT, STEP))
+
+        def rvs(self, *args, **kwargs):
+            raise NotImplementedError
+
+        def pdf(self, *args, **kwargs):
+            raise NotImplementedError
+
+    def flat(state):
+        return np.asarray(state.state_vector, dtype=float).ravel()
+
+    start = datetime(2000, 1, 1)
+    before = GaussianState(StateVector(MEAN), CovarianceMatrix(covariance()), timestamp=start)
+    compass = LinearGaussian(ndim_state=8, mapping=(2,), noise_covar=CovarianceMatrix(SAMPLE.covariance))
+    predictor, updater = ExtendedKalmanPredictor(Planar()), ExtendedKalmanUpdater(compass)
+    detection = Detection(
+        StateVector(SAMPLE.value), timestamp=start + timedelta(seconds=STEP), measurement_model=compass
+    )
+
+    def other_node():
+        predicted = predictor.predict(before, timestamp=detection.timestamp)
+        return updater.update(SingleHypothesis(predicted, detection))
+
+    after = benchmark(other_node)
+    agrees(flat(after), np.asarray(after.covar, dtype=float))
+
+
+@pytest.mark.parametrize("name", ["paper", "augmented_constant", "unscented", "imm", "imm_biases"])
+def test_hundred_seconds_of_a_filter(benchmark, name):
+    """200 ticks with delays and replay, all included: 6000 s are sixty times this."""
+    run = simulate(Conditions(duration=100.0), 1)
+    tracked = benchmark(lambda: track(run, FILTERS[name].make()))
+    assert np.isfinite(tracked.means[-1]).all()
