@@ -65,6 +65,16 @@ class VideoProgress(_Bar):
         self._show(done, total, f"{done}/{total} frames")
 
 
+class StudyProgress(_Bar):
+    """Bar of a study of many runs."""
+
+    def __init__(self) -> None:
+        super().__init__("study")
+
+    def __call__(self, done: float, total: float) -> None:
+        self._show(done, total, f"{done / total:4.0%}")
+
+
 @contextmanager
 def waiting(text: str) -> Iterator[None]:
     """Says what takes long; always, since nothing else shows that the program is alive."""

@@ -1,0 +1,117 @@
+"""`auvsim reproduce`: a paper's study, printed as tables and left as CSV and pictures."""
+
+import math
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+
+from rich import box
+from rich.console import Console
+from rich.table import Table
+
+from auvsim.cli.dock import output_folder
+from auvsim.cli.report import StudyProgress
+from auvsim.errors import InputError
+from auvsim.reproduce import paper1, paper1_acceptance, paper1_products
+from auvsim.reproduce.paper1_acceptance import SHORT, Verdict
+from auvsim.reproduce.paper1_study import FILTERS, ROWS, Result
+
+WIDTH = 150  # of the widest table [columns]
+LEGEND = (
+    "Ratios are rms errors by that of the paper's filter in the same runs. REG same noise as the paper's filter, REG* "
+    "its best, neither delay nor current; DLY delay only; CUR current only (eq. 11); A, A0 current as two states with "
+    "1e-5, 1e-8 m2/s3; IMM two of A with outliers inside. NEES is of the position per axis, 1 if consistent."
+)
+
+
+def run(*, quick: bool, seed: int, out: Path, jobs: int | None) -> int:
+    """Runs the study, prints it, fills the folder and returns the exit code.
+
+    Raises:
+        InputError: For a negative seed, no process, or a folder that cannot be written to.
+    """
+    if seed < 0:
+        raise InputError(f"command line: --seed {seed} must be 0 or more")
+    if jobs is not None and jobs < 1:
+        raise InputError(f"command line: --jobs {jobs} must be 1 or more; leave it out for all cores")
+    with output_folder(out):
+        with StudyProgress() as progress:
+            study = paper1.reproduce(seed, quick=quick, jobs=jobs, progress=progress)
+        written = paper1_products.write(study, out)
+    show(study)
+    print(f"written: {', '.join(str(path) for path in written)}", file=sys.stderr)
+    return 0
+
+
+def show(study: paper1.Study) -> None:
+    """Prints the study's tables."""
+    # Units stand in brackets. A narrow terminal breaks lines, where rich would break numbers.
+    console = Console(markup=False, width=max(WIDTH, Console().width))
+    judged = paper1_acceptance.verdicts(study)
+    console.print(study_table(study, judged))
+    console.print(LEGEND)
+    console.print(acceptance_table(judged))
+    console.print(table1(study))
+    met = sum(v.met for v in judged)
+    console.print(f"{met} of {len(judged)} met" + ("" if met == len(judged) else "; the rest, with reasons, above"))
+
+
+def study_table(study: paper1.Study, judged: list[Verdict]) -> Table:
+    """One line for each row of the study."""
+    form = "quick" if study.quick else "full"
+    table = Table(title=f"paper 1: the study, {form}, seed {study.seed}", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("row", no_wrap=True)
+    others = [key for key in FILTERS if key != paper1.REFERENCE]
+    for heading in ("runs", "paper [m]", *(SHORT[key] for key in others), "NEES A0", "NEES IMM+", "A0 / bound"):
+        table.add_column(heading, justify="right")
+    table.add_column("met")
+    for name, results in study.results.items():
+        bound = study.bounds.get(name, math.nan)
+        numbers = [results[key].ratio for key in others]
+        numbers += [_nees(results, "augmented_constant"), _nees(results, "imm_biases")]
+        numbers.append(results["augmented_constant"].rms / bound)
+        rms = f"{results[paper1.REFERENCE].rms:.3f}"
+        marks = [v.met for v in judged if v.row == name]
+        mark = "yes" if all(marks) else f"{sum(marks)} of {len(marks)}"
+        table.add_row(ROWS[name].title, str(study.runs[name]), rms, *map(_number, numbers), mark)
+    return table
+
+
+def acceptance_table(judged: list[Verdict]) -> Table:
+    """One line for each thing to reach, with the reason if it is not."""
+    table = Table(title="paper 1: what to reach", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    for heading in ("row", "quantity"):
+        table.add_column(heading, no_wrap=True)
+    for heading in ("measured", "accept"):
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("met")
+    titles = {paper1_acceptance.ALL: "all rows", paper1_acceptance.DELIVERY: "delivery of fixes"}
+    before = ""
+    for v in judged:
+        title = titles[v.row] if v.row in titles else ROWS[v.row].title
+        verdict = "yes" if v.met else f"NO: {v.reason}"
+        table.add_row("" if v.row == before else title, v.quantity, f"{v.measured:.3g}", v.accept, verdict)
+        before = v.row
+    return table
+
+
+def table1(study: paper1.Study) -> Table:
+    """The paper's Table 1 beside what its filter does here."""
+    table = Table(title="paper 1, Table 1: error of its filter", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    _, *lines = paper1_products.table1_rows(study)
+    for heading in ("distance [m]", "mean [m]", "paper's", "ratio", "variance [m2]", "paper's"):
+        table.add_column(heading, justify="right")
+    for distance, mean, paper_mean, ratio, variance, paper_variance in lines:
+        values = (f"{mean:.4f}", f"{paper_mean:.4f}", f"{ratio:.2f}", f"{variance:.4f}", f"{paper_variance:.4f}")
+        table.add_row(str(distance), *values)
+    return table
+
+
+def _nees(results: Mapping[str, Result], key: str) -> float:
+    return paper1_products.claimed_nees(key, results[key])
+
+
+def _number(value: float) -> str:
+    if math.isnan(value):
+        return "-"
+    return f"{value:.2f}" if value < 9.995 else f"{value:.1f}"
