@@ -1,8 +1,8 @@
 """Hands what sensors and modem deliver to an estimator, and its estimate to guidance.
 
 An estimator is made by `factory(parameters, scenario) -> Navigator`: `parameters` is the planar model it may believe
-(see `condense`), `scenario` the full `auvsim.scenario.Scenario`. Named factories are `augmented_ekf` (paper 1, section
-12) and `paper` (paper 1, sections 6 to 10); any other is given as `package.module:factory`.
+(see `condense`), `scenario` the full `auvsim.scenario.Scenario`. FACTORIES has those that are known by name: paper 1's
+filter, its baselines, and those with the current in their state; any other is given as `package.module:factory`.
 """
 
 import importlib
@@ -10,7 +10,7 @@ import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
@@ -23,16 +23,10 @@ from auvsim.errors import AuvsimError, InputError, unknown_name
 from auvsim.frames import Array, wrap
 from auvsim.sensors.reading import Reading
 from auvsim.settings import Settings
-from estimators.docking import (
-    PAPER_NOISE,
-    AugmentedFilter,
-    DockingEstimator,
-    DockingNoise,
-    PaperFilter,
-    UsblFix,
-    UsblModel,
-)
+from estimators.docking import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
+from estimators.planar_filter import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.planar_model import PlanarParameters
+from estimators.usbl import UsblFix, UsblModel
 
 
 class Commands(NamedTuple):
@@ -74,7 +68,9 @@ class EstimatorSettings(Settings):
     """Which estimator, and what it believes of the noises."""
 
     factory: str = Field(
-        default="augmented_ekf", description="augmented_ekf, paper, or package.module:factory of your own"
+        default="augmented_ekf",
+        description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, or "
+        "package.module:factory of your own",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="compass noise it believes, each reading [deg]")
     position_noise: float = Field(default=4e-4, ge=0, description="process noise of position [m2/s]")
@@ -82,9 +78,15 @@ class EstimatorSettings(Settings):
     velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
     yaw_rate_noise: float = Field(default=1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
     current_noise: float = Field(
-        default=1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 for turning currents"
+        default=1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
+    )
+    turning_noise: float = Field(
+        default=0.02, ge=0, description="random walk of the current in the second mode of the imm [m2/s3]"
     )
     dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it believes [deg]")
+    dock_heading_state: bool = Field(
+        default=True, description="whether that error is constant, and estimated, instead of new with each fix"
+    )
     model_speed: float = Field(
         default=1.0, gt=0, description="speed through the water at which the planar model is condensed [m/s]"
     )
@@ -123,17 +125,11 @@ class DockingNavigator:
                 self._smooth_depth(reading.stamp, float(reading.value[0]))
             elif reading.sensor == "usbl":
                 x, y, z, heading, pitch, roll, _ = reading.value.tolist()
-                fixes.append(
-                    UsblFix(
-                        stamp=reading.stamp,
-                        received=reading.received,
-                        position=(x, y, z),
-                        heading=heading,
-                        pitch=pitch,
-                        roll=roll,
-                        sequence=reading.sequence,
-                    )
-                )
+                fix = UsblFix(
+                    stamp=reading.stamp, received=reading.received, sequence=reading.sequence,
+                    position=(x, y, z), heading=heading, pitch=pitch, roll=roll,
+                )  # fmt: skip
+                fixes.append(fix)
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
             *fins, shaft_speed = (sum(values) / len(drives) for values in zip(*drives, strict=True))
@@ -175,7 +171,7 @@ class DockingNavigator:
 
 
 def _docking(
-    parameters: PlanarParameters, scenario: Any, kind: Callable[..., Any], base: DockingNoise
+    parameters: PlanarParameters, scenario: Any, kind: Callable[..., Any], base: DockingNoise, *, delayed: bool = True
 ) -> DockingNavigator:
     """A docking filter for a scenario; what it believes are the estimator's settings, never the sensors' draws."""
     settings: EstimatorSettings = scenario.estimator
@@ -183,9 +179,10 @@ def _docking(
     step = 1.0 / scenario.rates.filter
     readings = max(1.0, scenario.sensors.compass.rate * step)
     noise = replace(base, compass=math.radians(settings.compass_deg) / math.sqrt(readings))
-    model = UsblModel(transceiver=usbl.transceiver, dock_heading=math.radians(settings.dock_heading_deg))
+    white = 0.0 if "dock_heading" in base.biases else math.radians(settings.dock_heading_deg)
+    model = UsblModel(transceiver=usbl.transceiver, dock_heading=white)
     filter_ = kind(parameters, noise, transponder=usbl.transponder[:2])
-    estimator = DockingEstimator(filter_, model, step=step)
+    estimator = DockingEstimator(filter_, model, step=step, compensate_delay=delayed)
     return DockingNavigator(estimator, _allocation(scenario.vehicle.model))
 
 
@@ -195,22 +192,66 @@ def _allocation(model: str) -> Allocation:
     return library.vehicle(model).allocation
 
 
-def augmented_ekf(parameters: PlanarParameters, scenario: Any) -> Navigator:
-    """The augmented extended Kalman filter in the delay buffer (paper 1, sections 8 and 12)."""
-    s: EstimatorSettings = scenario.estimator
-    noise = DockingNoise(
-        position=s.position_noise, heading=s.heading_noise, surge=s.velocity_noise, sway=s.velocity_noise,
-        yaw_rate=s.yaw_rate_noise, current=s.current_noise,
-    )  # fmt: skip
-    return _docking(parameters, scenario, AugmentedFilter, noise)
+def regular_ekf(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The regular filter: knows neither delay nor current, with the noise that suits such a filter best."""
+    return _docking(parameters, scenario, partial(PaperFilter, weights=None), REGULAR_NOISE, delayed=False)
+
+
+def delay_only(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """Half of paper 1's filter: the delay buffer (sections 8 and 9), and no current."""
+    return _docking(parameters, scenario, partial(PaperFilter, weights=None), REGULAR_NOISE)
+
+
+def current_only(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The other half: the current by eq. 11, with fixes taken as made when they arrive."""
+    return _docking(parameters, scenario, PaperFilter, PAPER_NOISE, delayed=False)
 
 
 def paper(parameters: PlanarParameters, scenario: Any) -> Navigator:
-    """Paper 1's improved filter, with the noises it recommends."""
+    """Paper 1's improved filter (sections 6 to 10), with the noises it recommends."""
     return _docking(parameters, scenario, PaperFilter, PAPER_NOISE)
 
 
-FACTORIES: dict[str, Callable[[PlanarParameters, Any], Navigator]] = {"augmented_ekf": augmented_ekf, "paper": paper}
+def augmented_ekf(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The augmented extended Kalman filter in the delay buffer (paper 1, sections 8 and 12)."""
+    return _docking(parameters, scenario, AugmentedFilter, _noise(scenario))
+
+
+def ukf(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The same with sigma points instead of derivatives."""
+    return _docking(parameters, scenario, partial(AugmentedFilter, transform="unscented"), _noise(scenario))
+
+
+def imm(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """Two interacting augmented filters, for steady and turning currents (paper 1, section 13)."""
+    return _interacting(parameters, scenario, _noise(scenario))
+
+
+def imm_biased(parameters: PlanarParameters, scenario: Any) -> Navigator:
+    """The same with the errors of thrust and compass in the state."""
+    noise = _noise(scenario)
+    return _interacting(parameters, scenario, replace(noise, biases={**BIASES_OF_VEHICLE, **noise.biases}))
+
+
+def _interacting(parameters: PlanarParameters, scenario: Any, noise: DockingNoise) -> Navigator:
+    s: EstimatorSettings = scenario.estimator
+    kind = partial(InteractingFilter, currents=(s.current_noise, s.turning_noise))
+    return _docking(parameters, scenario, kind, noise)
+
+
+def _noise(scenario: Any) -> DockingNoise:
+    """What a filter with the current in its state believes."""
+    s: EstimatorSettings = scenario.estimator
+    constant = s.dock_heading_state and s.dock_heading_deg > 0.0  # a state without variance is none
+    return DockingNoise(
+        position=s.position_noise, heading=s.heading_noise, surge=s.velocity_noise, sway=s.velocity_noise,
+        yaw_rate=s.yaw_rate_noise, current=s.current_noise,
+        biases={"dock_heading": Bias(math.radians(s.dock_heading_deg))} if constant else {},
+    )  # fmt: skip
+
+
+_NAMED = (augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf)
+FACTORIES: dict[str, Callable[[PlanarParameters, Any], Navigator]] = {named.__name__: named for named in _NAMED}
 
 
 def find_factory(name: str) -> Callable[[PlanarParameters, Any], Any]:

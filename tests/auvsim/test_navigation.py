@@ -70,9 +70,9 @@ def compass(time: float, heading: float) -> Reading:
     return Reading("compass", time, time, np.array([wrap(heading), 0.0, 0.0]))
 
 
-@pytest.mark.parametrize("name", ["augmented_ekf", "paper"])
+@pytest.mark.parametrize("name", navigation.FACTORIES)
 def test_named_factories(name: str) -> None:
-    """Both give estimates that are not initialised before a fix and are after it."""
+    """All give estimates that are not initialised before a fix and are after it."""
     navigator = build(name)
     first = navigator.update(0.5, [compass(0.5, 0.1)], NONE)
     assert not first.initialised
@@ -82,6 +82,59 @@ def test_named_factories(name: str) -> None:
     # Transponder 50 m before the mouth on a dock that faces north; the vehicle has moved on by less than a metre.
     np.testing.assert_allclose(second.position[:2], [-50.0, 3.0], atol=1.0)
     assert np.isfinite(second.covariance).all()
+
+
+def drifting(name: str, delay: float, **settings) -> Estimate:
+    """After five minutes at rest in the water, which flows east at 0.5 m/s: exact fixes each 5 s, `delay` old."""
+    plan = PLAN.model_copy(update={"estimator": PLAN.estimator.model_copy(update=settings)})
+    navigator, last = build(name, plan), None
+    for k in range(1, 601):
+        time = 0.5 * k
+        readings = [compass(time, 0.0)]
+        if k % 10 == 0:
+            seen = np.array([-50.0, -75.0 + 0.5 * (time - delay), 0.0, 0.0, 0.0, 0.0, 20.0])
+            readings.append(Reading("usbl", time - delay, time, seen, k))
+        last = navigator.update(time, readings, NONE)
+    assert isinstance(last, Estimate)
+    return last
+
+
+@pytest.mark.parametrize("name", navigation.FACTORIES)
+def test_who_knows_current_and_delay(name: str) -> None:
+    """Those without a current say there is none; those without the buffer lag behind by what it flows in the delay.
+
+    That is 1.5 m in 3 s; a tenth of it, and of the flow, is left to what is believed of the noise. The regular filter
+    lags behind its last fix besides.
+    """
+    estimate = drifting(name, 3.0)
+    knows_current = name not in ("regular_ekf", "delay_only")
+    expected = [0.0, 0.5] if knows_current else [0.0, 0.0]
+    np.testing.assert_allclose(estimate.current, expected, atol=0.05)
+    error = float(estimate.position[1] - 75.0)
+    if name == "current_only":
+        assert error == pytest.approx(-1.5, abs=0.15)
+    elif name == "regular_ekf":
+        assert error < -1.4
+    elif name == "delay_only":  # the last fix was made 3 s ago, and nothing moved it since
+        assert error == pytest.approx(-1.5, abs=0.3)
+    else:
+        assert error == pytest.approx(0.0, abs=0.15)
+
+
+@pytest.mark.parametrize("name", ["augmented_ekf", "ukf", "imm", "imm_biased"])
+def test_an_error_of_the_dock_that_is_constant_does_not_average_out(name: str) -> None:
+    """As a state, the dock's heading leaves its share across the line of sight, here north; as white noise it does not.
+
+    Three degrees are 3.9 m across 75 m, however many fixes there are. White noise of that size falls by the root of
+    the number of fixes that the filter remembers, more than four of them.
+    """
+    sigmas = [
+        math.sqrt(drifting(name, 3.0, dock_heading_deg=degrees, dock_heading_state=constant).covariance[0, 0])
+        for degrees, constant in ((3.0, True), (3.0, False), (0.0, True))
+    ]
+    assert sigmas[0] == pytest.approx(math.radians(3.0) * 75.0, rel=0.1)
+    assert sigmas[1] < 0.6 * sigmas[0]
+    assert sigmas[2] < sigmas[1]
 
 
 MODULE = """
@@ -116,7 +169,7 @@ def test_factory_of_ones_own_from_a_package(tmp_path, monkeypatch) -> None:
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("ekf", "no estimator 'ekf'; there are augmented_ekf, package.module:factory of your own, paper"),
+        ("particle", "no estimator 'particle'; there are augmented_ekf, current_only, delay_only, imm, imm_biased, "),
         ("no_such_module:factory", "estimator 'no_such_module:factory': ModuleNotFoundError: No module named"),
         ("own_module:nothing", "estimator 'own_module:nothing': AttributeError: "),
         ("own_module:number", "estimator 'own_module:number' is not callable; it must be factory("),
@@ -265,7 +318,7 @@ def trial_readings(seed: int) -> list[tuple[float, list[Reading]]]:
     return updates
 
 
-@pytest.mark.parametrize("name", ["augmented_ekf", "paper"])
+@pytest.mark.parametrize("name", navigation.FACTORIES)
 def test_reset_is_as_new(name: str) -> None:
     """After another minute and a reset, the same readings give the same estimates, bit for bit."""
     used, fresh = build(name), build(name)
