@@ -70,7 +70,7 @@ class EstimatorSettings(Settings):
     factory: str = Field(
         default="augmented_ekf",
         description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, or "
-        "package.module:factory of your own",
+        "package.module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="compass noise it believes, each reading [deg]")
     position_noise: float = Field(default=4e-4, ge=0, description="process noise of position [m2/s]")
