@@ -33,6 +33,7 @@ from auvsim.forces import (
     FIN_KIND,
     HULL,
     HULL_KIND,
+    PROPELLER,
     PROPELLER_KIND,
     SLOT,
     added_momentum,
@@ -44,7 +45,7 @@ from auvsim.forces import (
 WATER = 19  # numbers in a water slot
 
 _MASS, _VOLUME = HULL["added_mass"][0], HULL["displaced_volume"][0]
-_SWIRL = 10  # offset of a propeller's swirl recovery in its record
+_SWIRL = PROPELLER["swirl_recovery"][0]
 
 
 @intrinsic
