@@ -9,12 +9,21 @@ import pytest
 ROOT = Path(__file__).parents[1]
 LINES = """
     renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings
-    currents forces layout fluid hydrodynamics allocation library condense scenery world planar_world acoustics
-    sensors navigation guidance control scenario sampling netcdf log dock_frame recorder trial environment
+    currents forces layout fluid hydrodynamics allocation library condense planar_sets scenery world planar_world acoustics
+    sensors navigation guidance control manoeuvres scenario sampling netcdf log dock_frame recorder trial environment
     metrics drawing plots video export identification campaign reproduce cli
 """
 ORDER = LINES.split()
-MAY_IMPORT_ESTIMATORS = ("condense", "planar_world", "navigation", "metrics", "plots", "identification", "reproduce")
+MAY_IMPORT_ESTIMATORS = (
+    "condense",
+    "planar_sets",
+    "planar_world",
+    "navigation",
+    "metrics",
+    "plots",
+    "identification",
+    "reproduce",
+)
 MODULES = sorted(path for package in ("auvsim", "estimators") for path in (ROOT / package).rglob("*.py"))
 
 
