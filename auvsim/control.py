@@ -106,13 +106,16 @@ class Autopilot:
         """Smoothed depth [m], None before the first reading."""
         return self._depth.value
 
-    def command(self, heading: float, depth: float, speed: float) -> Commands:
-        """Actuator commands for a heading [rad], a depth [m] and a speed through the water [m/s], negative astern."""
+    def command(self, heading: float, depth: float, speed: float, rudder: float | None = None) -> Commands:
+        """Actuator commands for a heading [rad], a depth [m] and a speed through the water [m/s], negative astern.
+
+        A `rudder` [rad] that is given is taken as it is, and the heading left alone.
+        """
         s, shaft_speed = self._settings, self._shaft_speed(speed)
         self._way = speed if self._way is None else self._way + (speed - self._way) * self._period / WAY
         if self._heading.value is None or self._pitch.value is None or self._depth.value is None:
             return Commands(0.0, 0.0, shaft_speed)
-        rudder = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
+        holding = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
         error = depth - self._depth.value
         wanted = -(s.depth_gain * error + s.depth_integral_gain * self._integral)
         pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
@@ -121,7 +124,8 @@ class Autopilot:
         if abs(error) < 0.5 and pitch == wanted:
             self._integral += error * self._period
         if self._way < 0.0:  # fins act the other way round when the flow comes from astern
-            rudder, elevator = -s.astern_factor * rudder, -elevator
+            holding, elevator = -s.astern_factor * holding, -elevator
+        rudder = holding if rudder is None else rudder
         limit = self._fin_limit
         return Commands(max(-limit, min(limit, rudder)), max(-limit, min(limit, elevator)), shaft_speed)
 

@@ -10,7 +10,7 @@ from auvsim.frames import Array
 from auvsim.log import PHASES, TrialLog
 from auvsim.metrics import phase_at, phase_stretches
 
-PHASE_COLOURS = ("#7f7f7f", "#1f77b4", "#17a2a2", "#2ca02c", "#9467bd", "#ff7f0e", "#d62728")  # as in PHASES
+PHASE_COLOURS = ("#7f7f7f", "#1f77b4", "#17a2a2", "#2ca02c", "#9467bd", "#ff7f0e", "#d62728", "#1f77b4")  # as in PHASES
 NO_PHASE = "#444444"
 DOCK = "#8c4a1f"
 WATER = "#0055aa"

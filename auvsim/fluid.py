@@ -21,11 +21,8 @@ from typing import Any
 
 import llvmlite.binding
 import mujoco
-from llvmlite import ir
 from numba import cfunc, njit, types
-from numba.core import cgutils
 from numba.core.caching import FunctionCache
-from numba.extending import intrinsic
 
 from auvsim import layout
 from auvsim.forces import (
@@ -41,48 +38,13 @@ from auvsim.forces import (
     hull_force,
     propeller_force,
 )
+from auvsim.pointers import integers, load_pointer, numbers, scratch
 
 WATER = 19  # numbers in a water slot
 
 _MASS, _VOLUME = HULL["added_mass"][0], HULL["displaced_volume"][0]
 _SWIRL = PROPELLER["swirl_recovery"][0]
-
-
-@intrinsic
-def _load_pointer(typingctx: Any, address: Any = None) -> Any:
-    """The pointer-sized number at an address."""
-
-    def codegen(context, builder, signature, args):
-        pointer = builder.inttoptr(args[0], cgutils.intp_t.as_pointer())
-        return builder.load(pointer)
-
-    return types.intp(types.intp), codegen
-
-
-def _cast(kind: Any):
-    @intrinsic
-    def cast(typingctx: Any, address: Any = None) -> Any:
-        def codegen(context, builder, signature, args):
-            return builder.inttoptr(args[0], context.get_value_type(types.CPointer(kind)))
-
-        return types.CPointer(kind)(types.intp), codegen
-
-    return cast
-
-
-_numbers = _cast(types.float64)
-_integers = _cast(types.int32)
-
-
-@intrinsic
-def _scratch(typingctx: Any = None) -> Any:
-    """Stack space for 42 numbers: a hull's Jacobian."""
-
-    def codegen(context, builder, signature, args):
-        space = cgutils.alloca_once(builder, ir.DoubleType(), size=42)
-        return space
-
-    return types.CPointer(types.float64)(), codegen
+_scratch = scratch(42)  # a hull's Jacobian (6, 6) and a row of its product
 
 
 @njit(cache=True, error_model="numpy")
@@ -247,20 +209,20 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
 
     @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
     def passive(m, d):
-        nuser = _load_pointer(m + m_nuser)
+        nuser = load_pointer(m + m_nuser)
         if nuser == 0:
             return
-        nbody = _load_pointer(m + m_nbody)
-        c = _numbers(_load_pointer(m + m_user))
-        weld, dofadr = _integers(_load_pointer(m + m_weld)), _integers(_load_pointer(m + m_dofadr))
-        dofnum, root = _integers(_load_pointer(m + m_dofnum)), _integers(_load_pointer(m + m_root))
-        parent, rows = _integers(_load_pointer(m + m_parent)), _integers(_load_pointer(m + m_rows))
-        time = _numbers(d + d_time)[0]
-        water, xpos = _numbers(_load_pointer(d + d_userdata)), _numbers(_load_pointer(d + d_xpos))
-        xmat, cvel = _numbers(_load_pointer(d + d_xmat)), _numbers(_load_pointer(d + d_cvel))
-        coms, cdof = _load_pointer(d + d_com), _numbers(_load_pointer(d + d_cdof))
-        qfrc, M = _numbers(_load_pointer(d + d_qfrc)), _numbers(_load_pointer(d + d_M))
-        qvel = _numbers(_load_pointer(d + d_qvel))
+        nbody = load_pointer(m + m_nbody)
+        c = numbers(load_pointer(m + m_user))
+        weld, dofadr = integers(load_pointer(m + m_weld)), integers(load_pointer(m + m_dofadr))
+        dofnum, root = integers(load_pointer(m + m_dofnum)), integers(load_pointer(m + m_root))
+        parent, rows = integers(load_pointer(m + m_parent)), integers(load_pointer(m + m_rows))
+        time = numbers(d + d_time)[0]
+        water, xpos = numbers(load_pointer(d + d_userdata)), numbers(load_pointer(d + d_xpos))
+        xmat, cvel = numbers(load_pointer(d + d_xmat)), numbers(load_pointer(d + d_cvel))
+        coms, cdof = load_pointer(d + d_com), numbers(load_pointer(d + d_cdof))
+        qfrc, M = numbers(load_pointer(d + d_qfrc)), numbers(load_pointer(d + d_M))
+        qvel = numbers(load_pointer(d + d_qvel))
         J = _scratch()
         touched = False
         for body in range(1, nbody):
@@ -269,32 +231,15 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
             if kind == 0:
                 continue
             base = weld[body]
-            com = _numbers(coms + 24 * root[body])
+            com = numbers(coms + 24 * root[body])
             if kind == HULL_KIND:
                 if not touched:
                     # Rebuilt here, so that entering twice (mj_forwardSkip, mjd_transitionFD) adds nothing twice.
                     _make_M(m, d)
                     touched = True
-                gravity = _numbers(m + gravity_at)
-                _hull(
-                    c,
-                    o,
-                    body,
-                    water,
-                    time,
-                    gravity,
-                    xpos,
-                    xmat,
-                    cvel,
-                    com,
-                    cdof,
-                    parent,
-                    dofadr[base],
-                    qfrc,
-                    M,
-                    rows,
-                    J,
-                )
+                gravity = numbers(m + gravity_at)
+                at = dofadr[base]
+                _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, at, qfrc, M, rows, J)
             elif kind in (FIN_KIND, PROPELLER_KIND):
                 dof = dofadr[base] + dofnum[base] - 1
                 _surface(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
@@ -320,13 +265,13 @@ def _library() -> ctypes.CDLL:
 def _cached_code() -> list[Path]:
     """The index files of numba's cache for this module that are up to date; the others are deleted.
 
-    Numba watches the file of the function that it keeps, but this module's code has that of `forces` inside.
+    Numba watches the file of the function that it keeps, but this module's code has that of others inside.
     """
     try:
         folder = Path(FunctionCache(_build).cache_path)
     except RuntimeError:  # numba finds no folder that it may write to
         return []
-    written = Path(__file__).with_name("forces.py").stat().st_mtime
+    written = max(Path(__file__).with_name(name).stat().st_mtime for name in ("forces.py", "pointers.py"))
     current = []
     for index in folder.glob("fluid.*.nbi"):
         if index.stat().st_mtime < written:

@@ -28,9 +28,15 @@ PROPELLER = {"diameter": (HEAD, 1), "thrust_coefficients": (HEAD + 1, 2), "torqu
 PROPELLER |= {"wake_fraction": (HEAD + 5, 1), "thrust_deduction": (HEAD + 6, 1), "swirl_recovery": (HEAD + 7, 1)}
 RECORD = HEAD + 112 + 2 * STRIPS  # numbers a body needs: its `nuser_body`
 
-_VOLUME, _LIFT, _LIFT_X = HULL["displaced_volume"][0], HULL["body_lift"][0], HULL["body_lift_x"][0]
+_MASS, _LIFT, _LIFT_X = HULL["added_mass"][0], HULL["body_lift"][0], HULL["body_lift_x"][0]
 _CROSS_FLOW, _STRIP_X, _STRIP_AREA = HULL["cross_flow_drag"][0], HULL["strip_x"][0], HULL["strip_area"][0]
 _LINEAR, _QUADRATIC = HULL["linear_damping"][0], HULL["quadratic_damping"][0]
+_AREA, _SLOPE, _STALL = FIN["area"][0], FIN["lift_slope"][0], FIN["stall_angle"][0]
+_DRAG, _INDUCED = FIN["drag"][0], FIN["induced_drag"][0]
+_NORMAL, _ASTERN = FIN["normal_drag"][0], FIN["astern_lift"][0]
+_DIAMETER, _THRUST = PROPELLER["diameter"][0], PROPELLER["thrust_coefficients"][0]
+_TORQUE, _WAKE = PROPELLER["torque_coefficients"][0], PROPELLER["wake_fraction"][0]
+_DEDUCTION = PROPELLER["thrust_deduction"][0]
 
 _inline = njit(cache=True, inline="never", error_model="numpy", fastmath=False)
 
@@ -38,7 +44,7 @@ _inline = njit(cache=True, inline="never", error_model="numpy", fastmath=False)
 @_inline
 def added_momentum(c, o, i, v0, v1, v2, w0, w1, w2):
     """Row i of `M_A nu`, [kg m/s] or [kg m2/s]."""
-    a = o + HEAD + 6 * i
+    a = o + _MASS + 6 * i
     return c[a] * v0 + c[a + 1] * v1 + c[a + 2] * v2 + c[a + 3] * w0 + c[a + 4] * w1 + c[a + 5] * w2
 
 
@@ -131,16 +137,15 @@ def fin_force(c, o, v0, v1):
         return 0.0, 0.0
     speed = math.sqrt(speed2)
     ca, sa = v0 / speed, v1 / speed
-    a = o + HEAD
-    slope = c[a + 1] if v0 >= 0.0 else c[a + 1] * c[a + 6]
+    slope = c[o + _SLOPE] if v0 >= 0.0 else c[o + _SLOPE] * c[o + _ASTERN]
     cl = slope * sa * abs(ca)
-    attached_drag = c[a + 3] + c[a + 4] * cl * cl
-    margin = (math.asin(min(1.0, abs(sa))) - c[a + 2]) / 0.0873
+    attached_drag = c[o + _DRAG] + c[o + _INDUCED] * cl * cl
+    margin = (math.asin(min(1.0, abs(sa))) - c[o + _STALL]) / 0.0873
     separated = 0.0 if margin <= -1.0 else 1.0 if margin >= 1.0 else 0.25 * (margin + 1.0) ** 2 * (2.0 - margin)
-    plate = c[a + 5] * sa
+    plate = c[o + _NORMAL] * sa
     cl = (1.0 - separated) * cl + separated * plate * abs(ca)
-    cd = (1.0 - separated) * attached_drag + separated * (c[a + 3] + plate * sa)
-    q = 0.5 * c[o + DENSITY] * c[a] * speed2
+    cd = (1.0 - separated) * attached_drag + separated * (c[o + _DRAG] + plate * sa)
+    q = 0.5 * c[o + DENSITY] * c[o + _AREA] * speed2
     # Lift is across the flow and opposes the normal velocity, drag is against the motion.
     lift0 = cl * sa if v0 >= 0.0 else -cl * sa
     return q * (lift0 - cd * ca), q * (-cl * abs(ca) - cd * sa)
@@ -161,10 +166,9 @@ def propeller_force(c, o, v0, n):
     Returns:
         Thrust ahead, after thrust deduction [N], and torque that the water puts on the shaft [N m].
     """
-    a = o + HEAD
-    d = c[a]
-    advance = (1.0 - c[a + 5]) * v0 / d if v0 * n > 0.0 else 0.0
+    d = c[o + _DIAMETER]
+    advance = (1.0 - c[o + _WAKE]) * v0 / d if v0 * n > 0.0 else 0.0
     scale = c[o + DENSITY] * d * d * d * d * abs(n)
-    thrust = scale * (c[a + 1] * n + c[a + 2] * advance)
-    torque = scale * d * (c[a + 3] * n + c[a + 4] * advance)
-    return (1.0 - c[a + 6]) * thrust, -torque
+    thrust = scale * (c[o + _THRUST] * n + c[o + _THRUST + 1] * advance)
+    torque = scale * d * (c[o + _TORQUE] * n + c[o + _TORQUE + 1] * advance)
+    return (1.0 - c[o + _DEDUCTION]) * thrust, -torque

@@ -36,6 +36,7 @@ class Phase(IntEnum):
     DOCKED = 4  # the latch holds
     GO_AROUND = 5  # back out and round for another attempt
     ABORTED = 6  # given up
+    MANOEUVRE = 7  # no docking: a manoeuvre for the identification of the vehicle
 
 
 class GuidanceSettings(Settings):
@@ -122,6 +123,8 @@ class Guidance:
         settings: distances, speeds, limits.
         geometry: of vehicle and dock.
     """
+
+    rudder: float | None = None  # asked for itself [rad]: never, a docking steers by headings
 
     def __init__(self, settings: GuidanceSettings, geometry: Geometry) -> None:
         self._s, self._g = settings, geometry

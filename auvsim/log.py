@@ -15,7 +15,7 @@ from auvsim import netcdf
 from auvsim.errors import InputError
 from auvsim.guidance import Phase
 
-FORMAT_VERSION = 1
+FORMAT_VERSION = 2  # 1 knew neither `dvl` nor `gyro`; `read` gives it both, empty
 STATUSES = ("complete", "diverged", "interrupted")
 PHASES = tuple(phase.name.lower() for phase in Phase)  # flag values 0, 1, ...
 
@@ -48,6 +48,8 @@ SIZES: dict[str, int | None] = {  # None: as many as the vehicle has
     "down": 1,
     "fins_and_shaft": None,
     "packet": 7,
+    "over_ground_and_through_water": 6,
+    "pqr": 3,
 }
 
 _TIME = {"time": Variable((), "float64", "s", "simulated time")}
@@ -118,6 +120,13 @@ TABLE: dict[str, dict[str, Variable]] = {
         "lost": Variable((), "bool", "1", "whether the packet never arrived"),
         "outlier": Variable((), "bool", "1", "whether the fix was drawn as an outlier"),
     },
+    "dvl": _sensor(
+        "over_ground_and_through_water",
+        "m/s",
+        "velocity over ground u, v, w, then through the water u, v, w; NaN where that track is lost",
+        "body",
+    ),
+    "gyro": _sensor("pqr", "rad/s", "angular velocity p, q, r", "body"),
     "contact": _TIME
     | {
         "force": Variable((), "float64", "N", "magnitude of the normal contact force"),
@@ -177,7 +186,7 @@ def check(log: TrialLog, where: str) -> None:
         if name not in log.attributes:
             raise InputError(f"{where}: no attribute '{name}' ({meaning})")
     if log.attributes["format_version"] != FORMAT_VERSION:
-        raise InputError(f"{where}: log format {log.attributes['format_version']}; this auvsim reads {FORMAT_VERSION}")
+        raise InputError(f"{where}: log format {log.attributes['format_version']}; this auvsim reads 1 and 2")
     for group, variables in TABLE.items():
         if group not in log.groups:
             raise InputError(f"{where}: no group '{group}'; a trial log has {', '.join(TABLE)}")
@@ -198,14 +207,12 @@ def write(log: TrialLog, path: str | os.PathLike[str]) -> None:
         InputError: if the log does not fit the table, or the file cannot be written.
     """
     check(log, str(path))
-    groups = {
-        group: {
-            name: netcdf.Field(("time", *variable.dimensions), log[group][name], _description(variable))
-            for name, variable in variables.items()
-        }
-        for group, variables in TABLE.items()
-    }
-    netcdf.save(path, groups, log.attributes)
+    netcdf.save(path, _fields(log), log.attributes)
+
+
+def pack(log: TrialLog) -> bytes:
+    """What the file of a log holds, to be written elsewhere."""
+    return netcdf.pack(_fields(log), log.attributes)
 
 
 def read(path: str | os.PathLike[str]) -> TrialLog:
@@ -215,6 +222,9 @@ def read(path: str | os.PathLike[str]) -> TrialLog:
         InputError: if there is no such file, or it is not a whole log of this format.
     """
     groups, attributes = netcdf.load(path)
+    if attributes.get("format_version") == 1:
+        attributes["format_version"] = FORMAT_VERSION
+        groups |= {group: _empty(group) for group in ("dvl", "gyro")}
     log = TrialLog(groups, attributes)
     check(log, str(path))
     return log
@@ -248,6 +258,17 @@ def table_markdown() -> str:
     return "\n".join(lines)
 
 
+def _fields(log: TrialLog) -> dict[str, dict[str, netcdf.Field]]:
+    """The variables of a log as NetCDF has them."""
+    return {
+        group: {
+            name: netcdf.Field(("time", *variable.dimensions), log[group][name], _description(variable))
+            for name, variable in variables.items()
+        }
+        for group, variables in TABLE.items()
+    }
+
+
 def _description(variable: Variable) -> dict[str, str | NDArray[Any]]:
     """The NetCDF attributes of a variable (flags as in the CF conventions, section 3.5)."""
     texts = {"units": variable.units, "long_name": variable.long_name, "frame": variable.frame}
@@ -258,6 +279,14 @@ def _description(variable: Variable) -> dict[str, str | NDArray[Any]]:
         **texts,
         "flag_values": np.arange(len(variable.flags), dtype=variable.dtype),
         "flag_meanings": " ".join(variable.flags),
+    }
+
+
+def _empty(group: str) -> dict[str, NDArray[Any]]:
+    """The variables of a group in which nothing was logged."""
+    return {
+        name: np.zeros((0, *(SIZES[dimension] or 0 for dimension in variable.dimensions)), dtype=variable.dtype)
+        for name, variable in TABLE[group].items()
     }
 
 

@@ -87,6 +87,10 @@ class EstimatorSettings(Settings):
     dock_heading_state: bool = Field(
         default=True, description="whether that error is constant, and estimated, instead of new with each fix"
     )
+    model: str = Field(
+        default="condense",
+        description="planar model it believes: condense, a name in models/<vehicle>/planar/, or the path of a .yaml",
+    )
     model_speed: float = Field(
         default=1.0, gt=0, description="speed through the water at which the planar model is condensed [m/s]"
     )

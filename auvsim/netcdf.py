@@ -43,19 +43,25 @@ def save(
         InputError: if the file cannot be written.
     """
     path = Path(path)
+    content = pack(groups, attributes)
+    try:
+        with whole(path) as partial, open(partial, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+
+
+def pack(groups: Mapping[str, Mapping[str, Field]], attributes: Mapping[str, Attribute]) -> bytes:
+    """What the file of groups of fields holds."""
     content = io.BytesIO()
     with h5py.File(content, "w", track_order=True) as file:
         file.attrs.update(attributes)
         identifiers = count()
         for name, fields in groups.items():
             _save_group(file.create_group(name, track_order=True), fields, identifiers)
-    try:
-        with whole(path) as partial, open(partial, "wb") as stream:
-            stream.write(content.getbuffer())
-            stream.flush()
-            os.fsync(stream.fileno())
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    return content.getvalue()
 
 
 def _save_group(group: h5py.Group, fields: Mapping[str, Field], identifiers: Iterator[int]) -> None:

@@ -69,7 +69,7 @@ class LogWriter:
             "format_version": FORMAT_VERSION,
             "status": status,
             WALL_TIME: wall_time,
-            **{name: _version(package) for name, package in VERSIONS.items()},
+            **{name: version(package) for name, package in VERSIONS.items()},
         }
         log = TrialLog(groups, attributes)
         check(log, "log")
@@ -107,5 +107,6 @@ class LogWriter:
 
 
 @cache  # reading a package's metadata takes milliseconds
-def _version(package: str) -> str:
+def version(package: str) -> str:
+    """Of this or another installed package."""
     return auvsim.__version__ if package == "auvsim" else importlib.metadata.version(package)

@@ -4,14 +4,12 @@ A distribution stands where its value would: `range: {uniform: [250, 350]}`. Eac
 by its dotted key, so that pinning one value changes no other.
 """
 
-import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from numpy.random import Generator
-
 from auvsim import schema, yaml_text
+from auvsim.distributions import DISTRIBUTIONS, Distribution
 from auvsim.errors import InputError
 from auvsim.randomness import stream
 from auvsim.scenario import Scenario
@@ -33,10 +31,24 @@ RANDOM = {
     },
 }
 
+# A manoeuvre starts far from the dock, ahead away from it and at another depth; only the current is left to chance.
+MANOEUVRE = {
+    "vehicle": {
+        "start": {"range": 300.0, "bearing_deg": 0.0, "heading_deg": 0.0, "depth": 10.0, "speed": 1.5},
+    },
+    "dock": {"heading_deg": 180.0},
+    "sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}},
+}
+
 
 def default_plan() -> dict:
     """The installed plan: every key of a scenario; start, dock heading and current are distributions."""
     return merge(Scenario().model_dump(mode="json"), RANDOM)
+
+
+def manoeuvre_plan(kind: str) -> dict:
+    """The installed plan of a manoeuvre: the default one, far from the dock and with DVL and gyro."""
+    return merge(default_plan(), {**MANOEUVRE, "manoeuvre": {"kind": kind}})
 
 
 def load_plan(path: Path) -> tuple[dict, dict[str, str]]:
@@ -65,7 +77,13 @@ def merge(base: Mapping, override: Mapping) -> dict:
     return merged
 
 
-def draw(plan: Mapping, seed: int, trial: int = 0, places: Mapping[str, str] | None = None) -> dict:
+def draw(
+    plan: Mapping,
+    seed: int,
+    trial: int = 0,
+    places: Mapping[str, str] | None = None,
+    quantiles: Mapping[str, float] | None = None,
+) -> dict:
     """The definite values of one trial of a plan.
 
     Args:
@@ -73,11 +91,20 @@ def draw(plan: Mapping, seed: int, trial: int = 0, places: Mapping[str, str] | N
         seed: Seed of all trials of the plan.
         trial: Number of the trial.
         places: Where each dotted key was given, for errors.
+        quantiles: Between 0 and 1, for distributions (see `distributions`) that are not to draw on their own: the
+            value below which this share of the distribution lies.
 
     Raises:
         InputError: For a distribution whose parameters make no sense.
     """
-    return {key: _draw(value, key, seed, trial, places or {}) for key, value in plan.items()}
+    known = quantiles or {}
+
+    def value(path: str, distribution: Distribution, parameters: Any) -> Any:
+        if path in known:
+            return distribution.quantile(known[path], parameters)
+        return distribution.draw(stream(seed, trial, f"scenario/{path}"), parameters)
+
+    return {key: _definite(below, key, value, places or {}) for key, below in plan.items()}
 
 
 def is_distribution(value: Any) -> bool:
@@ -85,64 +112,64 @@ def is_distribution(value: Any) -> bool:
     return isinstance(value, Mapping) and len(value) == 1 and next(iter(value)) in DISTRIBUTIONS
 
 
-def _draw(value: Any, path: str, seed: int, trial: int, places: Mapping[str, str]) -> Any:
+def distributions(value: Any, path: str = "") -> Iterator[tuple[str, Mapping]]:
+    """Every distribution of a plan, those inside choices included, by the dotted key of its stream; some keys twice."""
+    if is_distribution(value):
+        yield path, value
+        ((name, options),) = value.items()
+        if name == "choice" and isinstance(options, list | tuple):
+            for option in options:
+                yield from distributions(option, f"{path}.{name}" if is_distribution(option) else path)
+        return
+    for key, below in _items(value):
+        yield from distributions(below, f"{path}.{key}" if path else str(key))
+
+
+def varied(value: Any, path: str = "", chosen: bool = False) -> Iterator[str]:
+    """The dotted keys of a plan whose values differ from trial to trial; with `chosen` all keys that hold a value."""
+    if is_distribution(value):
+        ((name, options),) = value.items()
+        for option in options if name == "choice" else [None]:
+            yield from varied(option, path, True)
+        return
+    items = list(_items(value))
+    if chosen and (not items or isinstance(value, list | tuple)):
+        yield path
+        return
+    for key, below in items:
+        yield from varied(below, f"{path}.{key}" if path else str(key), chosen)
+
+
+def check(plan: Mapping, places: Mapping[str, str] | None = None) -> None:
+    """Sees that every distribution of a plan makes sense, also those that are seldom chosen.
+
+    Raises:
+        InputError: For one whose parameters do not.
+    """
+    for path, value in distributions(plan):
+        _definite(value, path, lambda _, distribution, parameters: distribution.quantile(0.5, parameters), places or {})
+
+
+def _definite(value: Any, path: str, draw: Callable[[str, Distribution, Any], Any], places: Mapping[str, str]) -> Any:
     if is_distribution(value):
         ((name, parameters),) = value.items()
         try:
-            drawn = DISTRIBUTIONS[name](stream(seed, trial, f"scenario/{path}"), parameters)
+            drawn = draw(path, DISTRIBUTIONS[name], parameters)
         except ValueError as error:
             place = schema.place(path, places)
             text = f"{path}: {yaml_text.dump(value, flow=True)}: {error}"
             raise InputError(f"{place}: {text}" if place else text) from None
         # What was chosen may hold distributions itself.
-        return _draw(drawn, f"{path}.{name}" if is_distribution(drawn) else path, seed, trial, places)
+        return _definite(drawn, f"{path}.{name}" if is_distribution(drawn) else path, draw, places)
     if isinstance(value, Mapping):
-        return {key: _draw(below, f"{path}.{key}", seed, trial, places) for key, below in value.items()}
+        return {key: _definite(below, f"{path}.{key}", draw, places) for key, below in value.items()}
     if isinstance(value, list | tuple):
-        return [_draw(below, f"{path}.{index}", seed, trial, places) for index, below in enumerate(value)]
+        return [_definite(below, f"{path}.{index}", draw, places) for index, below in enumerate(value)]
     return value
 
 
-def _pair(parameters: Any, names: str) -> tuple[float, float]:
-    numbers = isinstance(parameters, list | tuple) and all(
-        isinstance(number, int | float) and not isinstance(number, bool) and math.isfinite(number)
-        for number in parameters
-    )
-    if not numbers or len(parameters) != 2:
-        raise ValueError(f"needs two numbers, [{names}]")
-    return float(parameters[0]), float(parameters[1])
-
-
-def _uniform(generator: Generator, parameters: Any) -> float:
-    low, high = _pair(parameters, "low, high")
-    if low > high:
-        raise ValueError("low must not exceed high")
-    return float(generator.uniform(low, high))
-
-
-def _log_uniform(generator: Generator, parameters: Any) -> float:
-    low, high = _pair(parameters, "low, high")
-    if not 0.0 < low <= high:
-        raise ValueError("needs 0 < low <= high")
-    return math.exp(generator.uniform(math.log(low), math.log(high)))
-
-
-def _normal(generator: Generator, parameters: Any) -> float:
-    mean, deviation = _pair(parameters, "mean, standard deviation")
-    if deviation < 0.0:
-        raise ValueError("the standard deviation must not be negative")
-    return float(generator.normal(mean, deviation))
-
-
-def _choice(generator: Generator, parameters: Any) -> Any:
-    if not isinstance(parameters, list | tuple) or not parameters:
-        raise ValueError("needs a list of values")
-    return parameters[int(generator.integers(len(parameters)))]
-
-
-DISTRIBUTIONS: dict[str, Callable[[Generator, Any], Any]] = {
-    "uniform": _uniform,
-    "log_uniform": _log_uniform,
-    "normal": _normal,
-    "choice": _choice,
-}
+def _items(value: Any) -> Iterator[tuple[Any, Any]]:
+    if isinstance(value, Mapping):
+        yield from value.items()
+    elif isinstance(value, list | tuple):
+        yield from enumerate(value)

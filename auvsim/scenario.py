@@ -12,10 +12,13 @@ from auvsim.control import ControlSettings
 from auvsim.current_settings import CurrentSettings, UniformSettings
 from auvsim.errors import InputError
 from auvsim.guidance import GuidanceSettings
+from auvsim.manoeuvre_settings import ManoeuvreSettings
 from auvsim.navigation import EstimatorSettings
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.depth import DepthSettings
+from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.feedback import FeedbackSettings
+from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.usbl import UsblSettings
 from auvsim.settings import Settings
 from auvsim.world import WorldSettings
@@ -67,6 +70,8 @@ class SensorSettings(Settings):
     depth: DepthSettings = DepthSettings()
     feedback: FeedbackSettings = FeedbackSettings()
     usbl: UsblSettings = UsblSettings()
+    dvl: DvlSettings = DvlSettings()
+    gyro: GyroSettings = GyroSettings()
 
 
 class Scenario(Settings):
@@ -85,6 +90,9 @@ class Scenario(Settings):
     guidance: GuidanceSettings = GuidanceSettings()
     control: ControlSettings = ControlSettings()
     world: WorldSettings = WorldSettings()
+    manoeuvre: ManoeuvreSettings | None = Field(
+        default=None, description="what the vehicle does instead of docking, by its `kind`"
+    )
 
     @model_validator(mode="after")
     def _rates_divide(self) -> "Scenario":
@@ -95,6 +103,14 @@ class Scenario(Settings):
                 raise ValueError(f"{key}: {rate:g} Hz does not divide the {name} rate {faster:g} Hz; use {fitting} Hz")
         return self
 
+    @model_validator(mode="after")
+    def _manoeuvre_fits(self) -> "Scenario":
+        if self.manoeuvre is not None and self.manoeuvre.duration > self.duration:
+            raise ValueError(
+                f"duration: {self.duration:g} s is too short for a manoeuvre of {self.manoeuvre.duration:g} s"
+            )
+        return self
+
     def _ratios(self) -> Iterator[tuple[str, float, str, float]]:
         """Key, rate, and the name and value of the rate that it must divide."""
         rates = self.rates
@@ -102,8 +118,10 @@ class Scenario(Settings):
         yield "rates.filter", rates.filter, "control", rates.control
         yield "rates.log", rates.log, "control", rates.control
         for name in SensorSettings.model_fields:
-            rate = getattr(getattr(self.sensors, name), "rate", None)
-            if rate is not None:  # the USBL has a period with jitter instead
+            sensor = getattr(self.sensors, name)
+            rate = getattr(sensor, "rate", None)
+            # The USBL has a period with jitter instead; a sensor that the vehicle does not have sets no limit.
+            if rate is not None and getattr(sensor, "enabled", True):
                 yield f"sensors.{name}.rate", rate, "control", rates.control
 
 

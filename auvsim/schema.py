@@ -139,15 +139,21 @@ def _section(model: type[BaseModel], values: Mapping, depth: int) -> Iterator[st
         below = member(field.annotation, value)
         if below is None or not isinstance(value, Mapping) or not (value.keys() & below.model_fields.keys()):
             yield from _leaf(name, value, field, indent)
+            if value is None:  # what could stand there instead
+                yield from _others(members(field.annotation), indent)
             continue
         if depth == 0:
             yield ""
         yield from (f"{indent}# {field.description or _first_line(below)}", f"{indent}{name}:")
         yield from _section(below, value, depth + 1)
-        for other in members(field.annotation):
-            if other is not below:
-                yield f"{indent}  # or: {_first_line(other)}"
-                yield from (f"{indent}  # {line}" for line in _section(other, {}, 0) if line)
+        yield from _others([other for other in members(field.annotation) if other is not below], indent)
+
+
+def _others(models: list[type[BaseModel]], indent: str) -> Iterator[str]:
+    """The settings classes that could stand in a place, as comments."""
+    for other in models:
+        yield f"{indent}  # or: {_first_line(other)}"
+        yield from (f"{indent}  # {line}" for line in _section(other, {}, 0) if line)
 
 
 def _default(field: FieldInfo) -> Any:

@@ -7,11 +7,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvsim import condense, library, navigation, scenario
+from auvsim import condense, library, manoeuvres, navigation, planar_sets, scenario
 from auvsim.acoustics import Channel
 from auvsim.control import Autopilot
 from auvsim.currents import build_current
-from auvsim.errors import DivergenceError
+from auvsim.errors import DivergenceError, InputError
 from auvsim.guidance import Geometry, Guidance, Phase
 from auvsim.log import TrialLog
 from auvsim.navigation import Commands, Estimate, Navigator
@@ -19,7 +19,9 @@ from auvsim.randomness import stream
 from auvsim.recorder import LogWriter
 from auvsim.sensors.compass import Compass
 from auvsim.sensors.depth import Depth
+from auvsim.sensors.dvl import Dvl
 from auvsim.sensors.feedback import Feedback
+from auvsim.sensors.gyro import Gyro
 from auvsim.sensors.reading import Reading
 from auvsim.sensors.usbl import Usbl
 from auvsim.truth import DockPose, Truth
@@ -84,10 +86,14 @@ class Loop:
 
         self.current = build_current(plan.current, noise("current"), plan.duration + 1.0)
         self.world = World.build(vehicle, dock, pose, self.current, plan.world, rates.physics)
-        believed = condense.condense(plan.vehicle.model, plan.estimator.model_speed, plan.world.water_density)
-        self.navigator: Navigator = navigation.build(plan.estimator.factory, believed.parameters, plan)
-        self.guidance = Guidance(
-            plan.guidance, Geometry(nose=vehicle.nose, mouth_radius=dock.mouth_radius, latched=dock.latched)
+        estimator, density = plan.estimator, plan.world.water_density
+        # What the shaft speed of a command is stays condensed, so that trials differ in nothing but the estimator.
+        believed = condense.condense(plan.vehicle.model, estimator.model_speed, density)
+        parameters = planar_sets.believed(estimator.model, plan.vehicle.model, estimator.model_speed, density)
+        self.navigator: Navigator = navigation.build(estimator.factory, parameters, plan)
+        geometry = Geometry(nose=vehicle.nose, mouth_radius=dock.mouth_radius, latched=dock.latched)
+        self.guidance = (
+            Guidance(plan.guidance, geometry) if plan.manoeuvre is None else _manoeuvring(plan, vehicle, believed)
         )
         self.autopilot = Autopilot(
             plan.control, believed.shaft_speed_for, vehicle.allocation.limit, vehicle.shaft_limit, 1.0 / rates.control
@@ -98,6 +104,11 @@ class Loop:
             (Depth(sensors.depth, noise("depth")), round(rates.control / sensors.depth.rate)),
             (Feedback(sensors.feedback, noise("feedback")), round(rates.control / sensors.feedback.rate)),
         ]
+        if sensors.dvl.enabled:
+            dvl = Dvl(sensors.dvl, noise("dvl"), self.current, plan.world.sea_floor)
+            self._sensors.append((dvl, round(rates.control / sensors.dvl.rate)))
+        if sensors.gyro.enabled:
+            self._sensors.append((Gyro(sensors.gyro, noise("gyro")), round(rates.control / sensors.gyro.rate)))
         self._usbl = Usbl(sensors.usbl, noise("usbl"), pose)
         self._channel = Channel(plan.acoustics, noise("acoustics"))
         self._physics_ticks = round(rates.physics / rates.control)
@@ -173,7 +184,7 @@ class Loop:
         wanted = guidance.update(time, self._estimate, heading, depth, self.world.latched)
         if guidance.phase in (Phase.APPROACH, Phase.FINAL):
             self.current.approach(guidance.attempt, float(np.hypot(*self._truth.position[:2])), time)
-        self._commands = autopilot.command(*wanted)
+        self._commands = autopilot.command(*wanted, guidance.rudder)
         self.world.command(*self._commands)
         self.log.append("guidance", (time, guidance.phase, guidance.attempt, *wanted, guidance.along, guidance.cross))
         self.log.append("command", (time, *self._commands))
@@ -181,7 +192,7 @@ class Loop:
             self.log.event(*event)
         guidance.events.clear()
         if guidance.finished and self._end == math.inf:
-            self._end = time + AFTERMATH
+            self._end = time + (AFTERMATH if guidance.phase != Phase.MANOEUVRE else 0.0)
         self.over = time >= self._end
 
     def progress(self) -> ProgressState:
@@ -197,6 +208,21 @@ class Loop:
             impulse += contact.force * tick
             self.log.append("contact", (contact.time, contact.force, impulse))
         return self.log.finish(status, wall_time=wall_time)
+
+
+def _manoeuvring(
+    plan: scenario.Scenario, vehicle: library.Vehicle, believed: condense.Condensed
+) -> manoeuvres.Manoeuvring:
+    """What stands in for the guidance to a dock in a manoeuvre."""
+    assert plan.manoeuvre is not None
+    fastest = max(manoeuvres.speeds(plan.manoeuvre))
+    if believed.shaft_speed_for(fastest) > vehicle.shaft_limit:
+        raise InputError(f"manoeuvre {plan.manoeuvre.kind}: the shaft of '{vehicle.name}' cannot hold {fastest:g} m/s")
+    start = plan.vehicle.start
+    steering = manoeuvres.Steering(
+        plan.manoeuvre, limit=vehicle.allocation.limit, rate=plan.rates.control, course=math.radians(start.heading_deg)
+    )
+    return manoeuvres.Manoeuvring(steering, start.depth)
 
 
 def _attributes(

@@ -1,15 +1,15 @@
 """The docking filter with the current in its state: a Kalman filter whose gate cannot lock it out."""
 
 from collections.abc import Sequence
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, Unpack
 
 from estimators import ekf, recovery, ukf
 from estimators.consistency import chi_square
 from estimators.ekf import Innovation
 from estimators.errors import ParameterError
 from estimators.history import Input, Node
-from estimators.planar_filter import COMPASS, USBL, DockingNoise, PlanarModels
-from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
+from estimators.planar_filter import COMPASS, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.planar_model import PlanarParameters, PlanarProcess
 from estimators.recovery import Rejected
 from estimators.types import Gaussian, Measurement
 
@@ -53,7 +53,7 @@ class AugmentedFilter:
         noise: What it believes of its noise, and the biases that it estimates besides.
         gate: Probability with which a fix that fits is accepted; None accepts all.
         transform: "extended" (EKF) or "unscented" (UKF).
-        transponder, initial_surge, integrator, max_substep: See `PlanarModels`.
+        **options: See `PlanarModels`.
     """
 
     def __init__(
@@ -61,25 +61,15 @@ class AugmentedFilter:
         parameters: PlanarParameters,
         noise: DockingNoise | None = None,
         *,
-        transponder: tuple[float, float] = (0.0, 0.0),
         gate: float | None = 0.999,
-        initial_surge: float | None = None,
-        integrator: Integrator = "midpoint",
-        max_substep: float = MAX_SUBSTEP,
         transform: Transform = "extended",
+        **options: Unpack[ModelOptions],
     ) -> None:
         if transform not in TRANSFORMS:
             raise ParameterError(f"no transform '{transform}'; there are {', '.join(TRANSFORMS)}")
         self.parameters = parameters
         self.noise = noise or DockingNoise()
-        self.models = PlanarModels(
-            parameters,
-            self.noise,
-            transponder=transponder,
-            initial_surge=initial_surge,
-            integrator=integrator,
-            max_substep=max_substep,
-        )
+        self.models = PlanarModels(parameters, self.noise, **options)
         self._kalman = TRANSFORMS[transform]
         self._gate = gate
 
@@ -101,7 +91,7 @@ class AugmentedFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                belief, _ = self._kalman.correct(state.belief, measurement, self.models.heading)
+                belief = self.models.fuse_heading(state.belief, measurement)
                 state = AugmentedState(belief, state.outliers, state.rejected, state.innovation)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)

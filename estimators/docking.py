@@ -7,7 +7,7 @@ arrives. Eq. 7 (into the world) is in `usbl`, eq. 11 (the current) here. World a
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Unpack
 
 import numpy as np
 
@@ -28,9 +28,10 @@ from estimators.planar_filter import (
     USBL,
     Bias,
     DockingNoise,
+    ModelOptions,
     PlanarModels,
 )
-from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters
+from estimators.planar_model import PlanarParameters
 from estimators.types import Array, Gaussian, Measurement
 from estimators.usbl import UsblFix, UsblModel, horizontal_rotation
 
@@ -98,8 +99,7 @@ class PaperFilter:
         parameters: The vehicle.
         noise: What it believes of its noise; that of the current is not used.
         weights: a_0 .. a_m of eq. 11; None leaves the current zero.
-        transponder, initial_surge, integrator, max_substep: See `PlanarModels`; the paper's integrator is "euler" with
-            a step of 0.5 s.
+        **options: See `PlanarModels`; the paper's integrator is "euler" with substeps of 0.5 s.
     """
 
     def __init__(
@@ -108,10 +108,7 @@ class PaperFilter:
         noise: DockingNoise = PAPER_NOISE,
         *,
         weights: tuple[float, ...] | None = (0.3, 0.3, 0.4),
-        transponder: tuple[float, float] = (0.0, 0.0),
-        initial_surge: float | None = None,
-        integrator: Integrator = "midpoint",
-        max_substep: float = MAX_SUBSTEP,
+        **options: Unpack[ModelOptions],
     ) -> None:
         if weights is not None and (len(weights) < 2 or min(weights) <= 0.0 or abs(sum(weights) - 1.0) > 1e-9):
             raise ParameterError(f"weights {weights} of eq. 11 must be two or more, above 0, of sum 1")
@@ -119,14 +116,7 @@ class PaperFilter:
         self.parameters = parameters
         self.noise = replace(noise, current=0.0, initial_current=0.0, biases={})
         self._weights = None if weights is None else np.array(weights)
-        self.models = PlanarModels(
-            parameters,
-            self.noise,
-            transponder=transponder,
-            initial_surge=initial_surge,
-            integrator=integrator,
-            max_substep=max_substep,
-        )
+        self.models = PlanarModels(parameters, self.noise, **options)
 
     def start(self, nodes: Sequence[Node[PaperState]], index: int) -> PaperState | None:
         """State at the first fix, with no current; a second fix at the same node is fused."""
@@ -148,7 +138,7 @@ class PaperFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                belief, _ = ekf.correct(state.belief, measurement, self.models.heading)
+                belief = self.models.fuse_heading(state.belief, measurement)
                 state = PaperState(belief, state.currents, state.last_fix, state.innovation)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)

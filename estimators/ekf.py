@@ -78,3 +78,18 @@ def correct_linear(
         raise NotFiniteError(f"correction of {belief.mean} by the residual {residual} is not finite")
     innovation = Innovation(residual=residual, covariance=S, gain=gain, nis=nis, accepted=status == loops.OK)
     return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation
+
+
+def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> Gaussian:
+    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns.
+
+    The same numbers as of `correct` in half its time, without what it says of the innovation.
+
+    Raises:
+        NotPositiveDefiniteError, NotFiniteError: As `correct`.
+    """
+    mean, covariance, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
+    if status != loops.OK:
+        residual = np.array([loops.wrap(value[0] - H[0] @ belief.mean)])
+        return correct_linear(belief, H, residual, R)[0]  # raises, with the reason
+    return Gaussian(mean=mean, covariance=covariance)

@@ -111,10 +111,8 @@ class InteractingFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                heading = self.models.heading
-                state = state._replace(
-                    beliefs=tuple(ekf.correct(belief, measurement, heading)[0] for belief in state.beliefs)
-                )
+                beliefs = tuple(self.models.fuse_heading(belief, measurement) for belief in state.beliefs)
+                state = state._replace(beliefs=beliefs)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)
         return state

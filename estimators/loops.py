@@ -121,6 +121,17 @@ def correct(mean, covariance, H, residual, R, gate):
 
 
 @compiled
+def correct_angle(mean, covariance, H, value, R):
+    """`correct` by an angle (1,) that is H x but for whole turns; returns only (mean, covariance, status)."""
+    expected = 0.0
+    for j in range(mean.size):
+        if H[0, j] != 0.0:
+            expected += H[0, j] * mean[j]
+    x, P, _, _, _, status = correct(mean, covariance, H, np.array([wrap(value[0] - expected)]), R, math.inf)
+    return x, P, status
+
+
+@compiled
 def joseph(covariance, HP, H, K, R):
     """(I - K H) P (I - K H)' + K R K', made of products of size n m only."""
     n, m = K.shape

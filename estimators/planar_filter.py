@@ -3,9 +3,11 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import TypedDict
 
 import numpy as np
 
+from estimators import ekf
 from estimators.errors import ParameterError
 from estimators.history import Node
 from estimators.loops import wrap
@@ -174,6 +176,15 @@ def steady_surge(parameters: PlanarParameters, shaft_speed: float) -> float:
     raise ParameterError(f"thrust {c:g} N meets no drag: X_uu {p.X_uu:g} or X_u {p.X_u:g} must be below 0")
 
 
+class ModelOptions(TypedDict, total=False):
+    """What filters on the planar model pass on to their `PlanarModels`, which explains it and has the defaults."""
+
+    transponder: tuple[float, float]
+    initial_surge: float | None
+    integrator: Integrator
+    max_substep: float
+
+
 class PlanarModels:
     """The process and measurement models of a docking filter, made of what it believes; and its start.
 
@@ -210,6 +221,10 @@ class PlanarModels:
     def process_with(self, noise: DockingNoise) -> PlanarProcess:
         """The same vehicle with other densities of the process noise."""
         return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
+
+    def fuse_heading(self, belief: Gaussian, sample: Measurement) -> Gaussian:
+        """Belief after a compass sample; the sensor is linear, so that this holds for every Kalman filter."""
+        return ekf.correct_angle(belief, self.heading.jacobian(belief.mean), sample.value, sample.covariance)
 
     def first(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, Measurement] | None:
         """Belief at the node of a first fix, and that fix; None without a fix there or any compass sample.

@@ -8,10 +8,11 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 LINES = """
-    renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings
-    currents forces layout fluid hydrodynamics allocation library condense planar_sets scenery world planar_world acoustics
-    sensors navigation guidance control manoeuvres scenario sampling netcdf log dock_frame recorder trial environment
-    metrics drawing plots video export identification campaign reproduce cli
+    renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings currents
+    forces layout pointers fluid hydrodynamics allocation library condense planar_sets scenery world planar_world
+    acoustics sensors navigation guidance control manoeuvre_settings manoeuvres scenario distributions sampling netcdf
+    log dock_frame recorder trial environment metrics manoeuvre_metrics drawing plots manoeuvre_plots video export
+    identification campaign reproduce cli
 """
 ORDER = LINES.split()
 MAY_IMPORT_ESTIMATORS = (

@@ -41,6 +41,25 @@ class Dock:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Manoeuvre:
+    """Runs manoeuvres of the vehicle, for its identification: KIND.nc and KIND.png each.
+
+    KIND is straight, circle, zigzag, multisine, prbs, spiral, optimal (designed to tell most of the vehicle), or table
+    and sequence, which need a file or an option that says of what. Any key of the scenario is an option too, such as
+    `--manoeuvre.heading_deg 20`.
+    """
+
+    kinds: Annotated[tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="KIND... [SCENARIO.yaml]")]
+    """Manoeuvres, then what to pin, as YAML."""
+    seed: int = 0
+    """Seed of every random number."""
+    trial: int = 0
+    """Number of the trial under that seed."""
+    out: Path = Path("out")
+    """Folder of the logs and pictures."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Video:
     """Draws docking.mp4 beside a log, or one picture of it."""
 
@@ -87,7 +106,8 @@ class Reproduce:
     """Reproduces the figures and tables of a paper.
 
     Prints the study with what it is to reach, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png. The same seed gives the same numbers, on however many cores.
+    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
+    gives the same numbers, on however many cores.
     """
 
     paper: Annotated[Literal["paper1"], tyro.conf.Positional]
@@ -100,10 +120,14 @@ class Reproduce:
     """Folder of the tables and pictures."""
     jobs: int | None = None
     """Processes; by default one for each core."""
+    truth: Literal["planar", "mujoco", "both"] = "both"
+    """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each."""
 
 
-Command = Dock | Video | Plot | Metrics | Reproduce | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
-TAKE_SCENARIO_KEYS = {"dock": Dock, "scenario": ScenarioText}
+Command = (
+    Dock | Manoeuvre | Video | Plot | Metrics | Reproduce | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
+)
+TAKE_SCENARIO_KEYS = {"dock": Dock, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -142,12 +166,22 @@ def _run(arguments: list[str]) -> int:
         from auvsim.cli import dock, options
 
         scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
+        if scenario.manoeuvre is not None:
+            raise InputError(f"the scenario is a manoeuvre; run it with `auvsim manoeuvre {scenario.manoeuvre.kind}`")
         return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+
+    if isinstance(command, Manoeuvre):
+        from auvsim.cli import manoeuvre
+
+        plans = manoeuvre.plans(command.kinds, values, command.seed, command.trial)
+        return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
 
     if isinstance(command, Reproduce):
         from auvsim.cli import reproduce
 
-        return reproduce.run(quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs)
+        return reproduce.run(
+            quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs, truth=command.truth
+        )
 
     from auvsim.cli import products
 

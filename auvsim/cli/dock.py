@@ -19,7 +19,7 @@ WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool) -> int:
     """Runs the trial, fills the folder and returns the exit code."""
     with output_folder(out):
-        log = _trial(scenario, seed, trial)
+        log = simulate(scenario, seed, trial)
         path = out / "trial.nc"
         write(log, path)
         for name in PRODUCTS:  # what an earlier trial left would not belong to this log
@@ -70,7 +70,8 @@ def output_folder(path: Path) -> Iterator[None]:
         raise
 
 
-def _trial(scenario: Scenario, seed: int, trial: int) -> TrialLog:
+def simulate(scenario: Scenario, seed: int, trial: int, name: str = "docking") -> TrialLog:
+    """Runs one trial with a progress bar of that name; says so if it has to compile first."""
     from auvsim import fluid
     from auvsim.trial import run_trial
 
@@ -80,7 +81,7 @@ def _trial(scenario: Scenario, seed: int, trial: int) -> TrialLog:
             short = scenario.model_copy(update={"duration": min(scenario.duration, WARM_UP)})
             if run_trial(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
                 raise KeyboardInterrupt
-    with report.TrialProgress() as progress:
+    with report.TrialProgress(name) as progress:
         return run_trial(scenario, seed=seed, trial=trial, progress=progress)
 
 

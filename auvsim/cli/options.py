@@ -44,13 +44,15 @@ def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
     return rest, values
 
 
-def scenario(path: Path | None, estimator: str | None, values: Mapping, seed: int, trial: int) -> Scenario:
-    """The definite scenario of one trial.
+def scenario(
+    path: Path | None, estimator: str | None, values: Mapping, seed: int, trial: int, base: Mapping | None = None
+) -> Scenario:
+    """The definite scenario of one trial, of the default plan or of `base`.
 
     Raises:
         InputError: One line with the file and line, or the option, at fault.
     """
-    plan, places = _plan(path, values, estimator)
+    plan, places = _plan(path, values, estimator, base)
     return parse(sampling.draw(plan, seed, trial, places), places)
 
 
@@ -67,8 +69,10 @@ def scenario_text(path: Path | None, default: bool, values: Mapping) -> str:
     return schema.commented(Scenario, plan)
 
 
-def _plan(path: Path | None, values: Mapping, estimator: str | None) -> tuple[dict, dict[str, str]]:
-    plan, places = sampling.default_plan(), {}
+def _plan(
+    path: Path | None, values: Mapping, estimator: str | None, base: Mapping | None = None
+) -> tuple[dict, dict[str, str]]:
+    plan, places = sampling.default_plan() if base is None else dict(base), {}
     if path is not None:
         pinned, places = sampling.load_plan(path)
         plan = sampling.merge(plan, pinned)

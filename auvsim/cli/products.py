@@ -13,10 +13,13 @@ NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `
 
 
 def plots(log: TrialLog, folder: Path) -> None:
-    """Draws track.png and estimates.png."""
-    from auvsim import plots
+    """Draws track.png and estimates.png; of a manoeuvre one picture of its name."""
+    from auvsim import manoeuvre_metrics, manoeuvre_plots, manoeuvres, plots
 
-    for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
+    pictures = ((plots.track, "track.png"), (plots.estimates, "estimates.png"))
+    if manoeuvre_metrics.is_manoeuvre(log):
+        pictures = ((manoeuvre_plots.manoeuvre, f"{manoeuvres.name(manoeuvre_metrics.settings(log))}.png"),)
+    for draw, name in pictures:
         with whole(folder / name) as partial:
             draw(log, partial)
 
@@ -47,9 +50,10 @@ def still(log: TrialLog, folder: Path, *, path: Path, time: float | None = None,
 
 def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
     """Writes summary.json and returns what it holds."""
-    from auvsim import metrics
+    from auvsim import manoeuvre_metrics, metrics
 
-    values = metrics.summarise(log).to_dict()
+    of_manoeuvre = manoeuvre_metrics.is_manoeuvre(log)
+    values = manoeuvre_metrics.summary(log) if of_manoeuvre else metrics.summarise(log).to_dict()
     with whole(folder / "summary.json") as partial:
         partial.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return values
@@ -57,9 +61,14 @@ def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
 
 def show_summary(log: TrialLog, folder: Path) -> None:
     """Writes summary.json and prints it as a table."""
-    from auvsim.cli.report import table
+    from auvsim import manoeuvre_metrics
+    from auvsim.cli import report
 
-    table(summary(log, folder))
+    values = summary(log, folder)
+    if manoeuvre_metrics.is_manoeuvre(log):
+        report.manoeuvres(manoeuvre_metrics.figures(log))
+    else:
+        report.table(values)
 
 
 def again(path: Path, make: Callable[..., None], /, **options: Any) -> int:

@@ -1,13 +1,19 @@
 """What a command shows while it works and when it is done."""
 
+import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from auvsim.manoeuvre_metrics import LABELS, Figures
+
+if TYPE_CHECKING:
+    from auvsim.identification.excitation import Outcome
 
 PERIOD = 0.1  # wall-clock time between two updates of a bar [s]; more often would slow the trial
 
@@ -48,8 +54,8 @@ class _Bar:
 class TrialProgress(_Bar):
     """Bar of a running trial: phase, range, simulated time."""
 
-    def __init__(self) -> None:
-        super().__init__("docking")
+    def __init__(self, name: str = "docking") -> None:
+        super().__init__(name)
 
     def __call__(self, state: ProgressState) -> None:
         self._show(state.time, state.duration, f"{state.phase}  {state.range:6.1f} m  {state.time:6.1f} s")
@@ -70,6 +76,16 @@ class StudyProgress(_Bar):
 
     def __init__(self) -> None:
         super().__init__("study")
+
+    def __call__(self, done: float, total: float) -> None:
+        self._show(done, total, f"{done / total:4.0%}")
+
+
+class DesignProgress(_Bar):
+    """Bar of the search for an optimal manoeuvre."""
+
+    def __init__(self) -> None:
+        super().__init__("design")
 
     def __call__(self, done: float, total: float) -> None:
         self._show(done, total, f"{done / total:4.0%}")
@@ -111,6 +127,33 @@ def table(summary: Mapping[str, Any]) -> None:
         where = "all phases" if phase == "all" else phase.replace("_", " ")
         table.add_row(f"position rms [m], NEES per axis, {where}", error)
     Console(markup=False).print(table)  # units stand in brackets
+
+
+def manoeuvres(found: Sequence[Figures]) -> None:
+    """Prints the figures of manoeuvres as one table, a column each."""
+    table = Table("", title="manoeuvres")
+    for figures in found:
+        table.add_column(figures.kind, justify="right")
+    for key, label in LABELS.items():
+        if any(key in figures.numbers for figures in found):
+            table.add_row(label, *(_text(figures.numbers.get(key)) for figures in found))
+    Console(markup=False).print(table)  # units stand in brackets
+
+
+def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", room: float) -> None:
+    """Prints what manoeuvres of one duration would tell of parameters as one table, a column each."""
+    table = Table("", title="expected standard deviation of each parameter [% of its value]")
+    for name in outcomes:
+        table.add_column(name, justify="right")
+    for index, parameter in enumerate(parameters):
+        deviations = (_text(100.0 * found.deviations[index]) for found in outcomes.values())
+        table.add_row(parameter, *deviations, end_section=index == len(parameters) - 1)
+    best = max(found.log_det for found in outcomes.values())
+    efficiencies = [math.exp((found.log_det - best) / len(parameters)) for found in outcomes.values()]
+    table.add_row("log det of the information", *(_text(found.log_det) for found in outcomes.values()))
+    table.add_row("information a parameter, of the best [-]", *map(_text, efficiencies))
+    table.add_row(f"room taken, {room:g} allowed [m]", *(_text(found.reach) for found in outcomes.values()))
+    Console(markup=False).print(table)
 
 
 def _text(value: Any) -> str:

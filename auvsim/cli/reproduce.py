@@ -12,9 +12,11 @@ from rich.table import Table
 from auvsim.cli.dock import output_folder
 from auvsim.cli.report import StudyProgress
 from auvsim.errors import InputError
-from auvsim.reproduce import paper1, paper1_acceptance, paper1_products
+from auvsim.reproduce import paired, paper1, paper1_acceptance, paper1_mujoco, paper1_products, paper1_truths
 from auvsim.reproduce.paper1_acceptance import SHORT, Verdict
+from auvsim.reproduce.paper1_mujoco import MujocoStudy
 from auvsim.reproduce.paper1_study import FILTERS, ROWS, Result
+from auvsim.reproduce.paper1_truths import DRAWN
 
 WIDTH = 150  # of the widest table [columns]
 LEGEND = (
@@ -24,8 +26,11 @@ LEGEND = (
 )
 
 
-def run(*, quick: bool, seed: int, out: Path, jobs: int | None) -> int:
-    """Runs the study, prints it, fills the folder and returns the exit code.
+def run(*, quick: bool, seed: int, out: Path, jobs: int | None, truth: str = "both") -> int:
+    """Runs the study on the planar model's truth, on MuJoCo's ("mujoco") or on both, prints it and fills the folder.
+
+    Returns:
+        The exit code.
 
     Raises:
         InputError: For a negative seed, no process, or a folder that cannot be written to.
@@ -34,11 +39,20 @@ def run(*, quick: bool, seed: int, out: Path, jobs: int | None) -> int:
         raise InputError(f"command line: --seed {seed} must be 0 or more")
     if jobs is not None and jobs < 1:
         raise InputError(f"command line: --jobs {jobs} must be 1 or more; leave it out for all cores")
+    planar = mujoco = None
     with output_folder(out):
-        with StudyProgress() as progress:
-            study = paper1.reproduce(seed, quick=quick, jobs=jobs, progress=progress)
-        written = paper1_products.write(study, out)
-    show(study)
+        if truth != "mujoco":
+            with StudyProgress() as progress:
+                planar = paper1.reproduce(seed, quick=quick, jobs=jobs, progress=progress)
+        if truth != "planar":
+            with StudyProgress() as progress:
+                mujoco = paper1_mujoco.reproduce(seed, quick=quick, jobs=jobs, progress=progress)
+        written = [] if planar is None else paper1_products.write(planar, out)
+        written += [] if mujoco is None else paper1_truths.write(planar, mujoco, out)
+    if planar is not None:
+        show(planar)
+    if mujoco is not None:
+        show_mujoco(planar, mujoco)
     print(f"written: {', '.join(str(path) for path in written)}", file=sys.stderr)
     return 0
 
@@ -56,12 +70,20 @@ def show(study: paper1.Study) -> None:
     console.print(f"{met} of {len(judged)} met" + ("" if met == len(judged) else "; the rest, with reasons, above"))
 
 
+def show_mujoco(planar: paper1.Study | None, mujoco: MujocoStudy) -> None:
+    """Prints the tables of the study on MuJoCo's truth, and beside that on the planar model's if there is one."""
+    console = Console(markup=False, width=max(WIDTH, Console().width))
+    console.print(mujoco_table(mujoco))
+    if planar is not None:
+        console.print(truths_table(planar, mujoco))
+
+
 def study_table(study: paper1.Study, judged: list[Verdict]) -> Table:
     """One line for each row of the study."""
     form = "quick" if study.quick else "full"
     table = Table(title=f"paper 1: the study, {form}, seed {study.seed}", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("row", no_wrap=True)
-    others = [key for key in FILTERS if key != paper1.REFERENCE]
+    others = [key for key in FILTERS if key != paired.REFERENCE]
     for heading in ("runs", "paper [m]", *(SHORT[key] for key in others), "NEES A0", "NEES IMM+", "A0 / bound"):
         table.add_column(heading, justify="right")
     table.add_column("met")
@@ -70,10 +92,45 @@ def study_table(study: paper1.Study, judged: list[Verdict]) -> Table:
         numbers = [results[key].ratio for key in others]
         numbers += [_nees(results, "augmented_constant"), _nees(results, "imm_biases")]
         numbers.append(results["augmented_constant"].rms / bound)
-        rms = f"{results[paper1.REFERENCE].rms:.3f}"
+        rms = f"{results[paired.REFERENCE].rms:.3f}"
         marks = [v.met for v in judged if v.row == name]
         mark = "yes" if all(marks) else f"{sum(marks)} of {len(marks)}"
         table.add_row(ROWS[name].title, str(study.runs[name]), rms, *map(_number, numbers), mark)
+    return table
+
+
+def mujoco_table(study: MujocoStudy) -> Table:
+    """One line for each row of the study on MuJoCo's truth."""
+    form = "quick" if study.quick else "full"
+    title = f"paper 1: the study on MuJoCo's truth, {form}, seed {study.seed}"
+    table = Table(title=title, box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("row", no_wrap=True)
+    others = [key for key in next(iter(study.results.values())) if key != paired.REFERENCE]
+    judged = [key for key in paper1_products.DOTS if key in others]
+    for heading in ("runs", "paper [m]", *(SHORT[key] for key in others), *(f"NEES {SHORT[key]}" for key in judged)):
+        table.add_column(heading, justify="right")
+    for name, results in study.results.items():
+        numbers = [results[key].ratio for key in others] + [_nees(results, key) for key in judged]
+        rms = f"{results[paired.REFERENCE].rms:.3f}"
+        table.add_row(paper1_mujoco.ROWS[name].title, str(study.runs[name]), rms, *map(_number, numbers))
+    return table
+
+
+def truths_table(planar: paper1.Study, mujoco: MujocoStudy) -> Table:
+    """One line for each row: ratios, with half their 95 % intervals, and NEES on the planar truth and on MuJoCo's."""
+    table = Table(title="paper 1: planar truth and MuJoCo's", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    table.add_column("row", no_wrap=True)
+    names = [SHORT[key].replace("+ ", "+") for key in DRAWN]
+    for quantity in ("paper [m]", *(f"{name} / paper" for name in names), *(f"NEES {name}" for name in names)):
+        for truth in ("planar", "MuJoCo"):
+            table.add_column(f"{quantity}, {truth}", justify="right", min_width=9)
+    for name, both in paper1_truths.beside(planar, mujoco):
+        cells = [f"{r[paired.REFERENCE].rms:.3f}" if r else "-" for r in both]
+        for key in DRAWN:
+            cells += [f"{r[key].ratio:.2f}±{1.96 * r[key].ratio_deviation:.2f}" if r else "-" for r in both]
+        for key in DRAWN:
+            cells += [_number(r[key].nees) if r else "-" for r in both]
+        table.add_row(paper1_truths.title(name), *cells)
     return table
 
 

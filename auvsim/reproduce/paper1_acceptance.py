@@ -90,13 +90,13 @@ def _criteria(study: Study) -> list[_Criterion]:
     found = []
     for name in ROWS:
         if name in SETTLED:
-            found += _settled(name, study.bounds.get(name))
+            found += _settled(name, study.bounds.get(name), study.batches.get(name))
         found += _OTHERS.get(name, ())
         found.append(_ratio(name, "imm_biases", high=NO_LOSS))
     return found
 
 
-def _settled(name: str, bound: float | None) -> list[_Criterion]:
+def _settled(name: str, bound: float | None, batch: float | None) -> list[_Criterion]:
     augmented, interacting = _AUGMENTED[name], _INTERACTING[name]
     mean = PAPER_MEANS[name]
     found = [
@@ -115,8 +115,19 @@ def _settled(name: str, bound: float | None) -> list[_Criterion]:
             low=0.98,
             high=1.02,
         ),
-        _Criterion(row=name, quantity="NEES A0", measure=lambda r: r["augmented_constant"].nees, low=0.85, high=1.15),
+        _Criterion(
+            row=name, quantity="NEES A0, position", measure=lambda r: r["augmented_constant"].nees, low=0.85, high=1.15
+        ),
+        _Criterion(
+            row=name,
+            quantity="NEES A0, eight states",
+            measure=lambda r: r["augmented_constant"].state_nees,
+            low=0.85,
+            high=1.15,
+        ),
     ]
+    if batch is not None:
+        found.append(_Criterion(row=name, quantity="batch MAP / A0", measure=lambda r: batch, low=0.98, high=1.02))
     if bound is not None:
         found.append(
             _Criterion(

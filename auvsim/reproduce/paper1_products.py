@@ -2,7 +2,7 @@
 
 import csv
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 from auvsim.drawing import BAND, dress, legend
 from auvsim.errors import InputError
 from auvsim.files import whole
-from auvsim.reproduce.paper1 import CURVES, REFERENCE, SETTLED, Curves, Study
+from auvsim.reproduce.paired import REFERENCE
+from auvsim.reproduce.paper1 import CURVES, SETTLED, Curves, Study
 from auvsim.reproduce.paper1_acceptance import PAPER_MEANS, PAPER_VARIANCES, verdicts
 from auvsim.reproduce.paper1_study import FILTERS, ROWS, Result
 
@@ -42,16 +43,31 @@ def write(study: Study, folder: Path) -> list[Path]:
     """
     tables = {"study.csv": study_rows, "acceptance.csv": acceptance_rows, "table1.csv": table1_rows}
     figures = {"figure6.png": figure6, "figure7.png": figure7, "study.png": study_figure}
+    return write_files(
+        folder,
+        {name: make(study) for name, make in tables.items()},
+        {name: draw(study) for name, draw in figures.items()},
+    )
+
+
+def write_files(
+    folder: Path, tables: Mapping[str, Iterable[Sequence[Any]]], figures: Mapping[str, Figure]
+) -> list[Path]:
+    """Writes tables as CSV and figures as PNG, by their names.
+
+    Raises:
+        InputError: If one of them cannot be written.
+    """
     path = folder
     try:
-        for name, make in tables.items():
+        for name, rows in tables.items():
             path = folder / name
             with whole(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file, lineterminator="\n").writerows([_text(value) for value in row] for row in make(study))
-        for name, draw in figures.items():
+                csv.writer(file, lineterminator="\n").writerows([_text(value) for value in row] for row in rows)
+        for name, figure in figures.items():
             path = folder / name
             with whole(path) as partial:
-                draw(study).savefig(partial, dpi=DPI, format="png")
+                figure.savefig(partial, dpi=DPI, format="png")
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror}") from error
     return [folder / name for name in (*tables, *figures)]
@@ -61,15 +77,16 @@ def study_rows(study: Study) -> Iterable[Sequence[Any]]:
     """Heading and lines of study.csv: one for each row and filter."""
     yield (
         "row", "title", "filter", "runs", "rms_m", "mean_m", "variance_m2", "maximum_m", "mean_peak_m",
-        "worst_run_rms_m", "nees_per_dof", "ratio", "ratio_low", "ratio_high", "bound_m", "ratio_to_bound",
+        "worst_run_rms_m", "nees_per_dof", "state_nees_per_dof", "ratio", "ratio_low", "ratio_high", "bound_m",
+        "ratio_to_bound",
     )  # fmt: skip
     for name, results in study.results.items():
         bound = study.bounds.get(name, math.nan)
         for key, result in results.items():
             yield (
                 name, ROWS[name].title, key, study.runs[name], result.rms, result.mean, result.variance,
-                result.maximum, result.peak, result.worst_rms, claimed_nees(key, result), result.ratio,
-                *interval(result), bound, result.rms / bound,
+                result.maximum, result.peak, result.worst_rms, claimed_nees(key, result), result.state_nees,
+                result.ratio, *interval(result), bound, result.rms / bound,
             )  # fmt: skip
 
 
@@ -119,7 +136,7 @@ def figure6(study: Study) -> Figure:
         axes.set(yscale="log", ylim=(0.005, 20.0), xlim=(0.0, curves.times[-1]))
         _mark_turn(axes)
         dress(axes, title, "time [s]" if axes is every else "", "position error [m]")
-    _finish(figure, one, "Position error on the 40 m circle; the current of 0.5 m/s turns by 90° in 120 to 130 s")
+    finish(figure, one, "Position error on the 40 m circle; the current of 0.5 m/s turns by 90° in 120 to 130 s")
     return figure
 
 
@@ -140,7 +157,7 @@ def figure7(study: Study) -> Figure:
         dress(panels[1 + k], f"Current {axis}: truth and estimates", "time [s]" if k else "", "current [m/s]")
     for axes in panels:
         _mark_turn(axes)
-    _finish(figure, panels[:2], "The same circle: error, and the current that the filters believed in")
+    finish(figure, panels[:2], "The same circle: error, and the current that the filters believed in")
     return figure
 
 
@@ -166,7 +183,7 @@ def study_figure(study: Study) -> Figure:
     axes.set_xlim(0.01, 40.0)
     axes.set_yticklabels([ROWS[name].title for name in names])
     dress(axes, "Left of the line: better than the paper's filter", "rms error by that of the paper's filter", "")
-    _finish(figure, axes, f"Paper 1's study, seed {study.seed}{', quick' if study.quick else ''}: 95 % intervals")
+    finish(figure, axes, f"Paper 1's study, seed {study.seed}{', quick' if study.quick else ''}: 95 % intervals")
     return figure
 
 
@@ -180,7 +197,8 @@ def _mark_turn(axes: Axes) -> None:
     axes.axvspan(*TURN, facecolor=BAND, lw=0.0, zorder=0)
 
 
-def _finish(figure: Figure, axes: Any, title: str) -> None:
+def finish(figure: Figure, axes: Any, title: str) -> None:
+    """Title, and one legend for all axes."""
     entries: dict[str, Any] = {}
     for each in np.atleast_1d(axes):
         handles, labels = each.get_legend_handles_labels()

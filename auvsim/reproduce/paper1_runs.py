@@ -5,12 +5,14 @@ is reproduced by its conditions and its seed; conditions that differ in one thin
 """
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
-from estimators.docking import DockingEstimator, UsblFix, UsblModel
+from auvsim import planar_world
+from estimators.docking import DockingEstimate, DockingEstimator, UsblFix, UsblModel
 from estimators.loops import wrap
 from estimators.planar_model import PRESTERO, PlanarProcess
 from estimators.types import Array
@@ -60,6 +62,20 @@ class Run:
     usbl: UsblModel  # the noise of the fixes, as a filter may believe it
 
 
+class Way(Protocol):
+    """The truth of a run."""
+
+    @property
+    def times(self) -> Array:
+        """(k,) [s]."""
+        ...
+
+    @property
+    def states(self) -> Array:
+        """(k, 8) north, east, psi, u, v, r, c_n, c_e then."""
+        ...
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Track:
     """What a filter believed at the ticks of a run."""
@@ -68,7 +84,7 @@ class Track:
     covariances: Array  # (k, 8, 8)
     refused: dict[str, int]
 
-    def errors(self, run: Run) -> Array:
+    def errors(self, run: Way) -> Array:
         """Horizontal distance (k,) from the truth [m]."""
         return np.linalg.norm((self.means - run.states)[:, :2], axis=1)
 
@@ -101,18 +117,23 @@ def in_order(run: Run) -> Run:
     return replace(run, fixes=tuple(sorted(fixes, key=lambda fix: fix.stamp)))
 
 
-def track(run: Run, docking_filter: Any, **options: Any) -> Track:
-    """How a filter follows a run; `options` of the `DockingEstimator`."""
-    estimator = DockingEstimator(docking_filter, run.usbl, step=TICK, **options)
-    count = len(run.times)
-    means, covariances = np.full((count, 8), math.nan), np.zeros((count, 8, 8))
+def follow(run: Run, estimator: DockingEstimator) -> Iterator[DockingEstimate]:
+    """What an estimator says at each tick of a run, given each fix at the first tick after it has arrived."""
     headings, rudders = run.compass.tolist(), run.rudder.tolist()
-    arrived, estimate = 0, None
+    arrived = 0
     for k, time in enumerate(run.times.tolist()):
         first = arrived
         while arrived < len(run.fixes) and run.fixes[arrived].received <= time:
             arrived += 1
-        estimate = estimator.tick(time, headings[k], rudders[k], 0.0, run.fixes[first:arrived])
+        yield estimator.tick(time, headings[k], rudders[k], 0.0, run.fixes[first:arrived])
+
+
+def track(run: Run, docking_filter: Any, **options: Any) -> Track:
+    """How a filter follows a run; `options` of the `DockingEstimator`."""
+    count = len(run.times)
+    means, covariances = np.full((count, 8), math.nan), np.zeros((count, 8, 8))
+    estimate = None
+    for k, estimate in enumerate(follow(run, DockingEstimator(docking_filter, run.usbl, step=TICK, **options))):
         if estimate.initialised:
             means[k], covariances[k] = estimate.mean, estimate.covariance
     return Track(means=means, covariances=covariances, refused=dict(estimate.refused) if estimate else {})
@@ -127,14 +148,12 @@ def _way(conditions: Conditions, rng: np.random.Generator) -> tuple[Array, Array
     heading, direction = rng.uniform(-math.pi, math.pi, 2)
     sense = 1.0 if rng.random() < 0.5 else -1.0
     count = STEPS * round(conditions.duration / TICK)
-    kicks = rng.standard_normal((count, 8)) * np.sqrt(DENSITIES * TRUTH_STEP)
-    # The current's course is known beforehand, so that its changes are kicks too.
     times = TRUTH_STEP * np.arange(count + 1)
     turned = np.zeros(count + 1)
     if conditions.turn is not None:
         turned = sense * 0.5 * math.pi * np.clip(np.interp(times, conditions.turn, (0.0, 1.0)), 0.0, 1.0)
     current = conditions.current * np.stack((np.cos(direction + turned), np.sin(direction + turned)), axis=1)
-    kicks[:, 6:8] += np.diff(current, axis=0)
+    kicks = planar_world.kicks(rng, DENSITIES, TRUTH_STEP, current)
     still = np.array([0.0, 0.0, 0.0, 0.8, 0.0, 0.0, 0.0, 0.0])
     steady = process.walk(still, np.full((3000, 2), (rudder, 0.0)), TRUTH_STEP, np.zeros((3000, 8)))[-1]
     # On a circle about the dock, to starboard: the dock is abeam.
@@ -152,14 +171,8 @@ def _orbit(conditions: Conditions, process: PlanarProcess, start: Array, kicks: 
     states, rudders = np.empty((len(kicks) + 1, 8)), [STEADY_RUDDER[conditions.radius]]
     states[0] = start
     for k in range(0, len(kicks), STEPS):
-        north, east, psi, u, v, r, c_n, c_e = states[k].tolist()
-        distance = math.hypot(north, east)
-        bearing = math.atan2(east, north)  # of the vehicle from the dock
-        # Clockwise round the dock; back onto the circle at up to 60 degrees.
-        outside = (distance - conditions.radius) / max(5.0, 0.3 * conditions.radius)
-        course = bearing + 0.5 * math.pi + math.radians(60.0) * math.tanh(outside)
-        across = -math.sin(course) * c_n + math.cos(course) * c_e
-        command = course - math.asin(max(-0.9, min(0.9, across / math.hypot(u, v))))
+        _, _, psi, u, v, r, _, _ = states[k].tolist()
+        command = heading_for(course_round(states[k], conditions.radius), states[k])
         rate = math.hypot(u, v) / conditions.radius
         rudder = STEADY_RUDDER[conditions.radius] + 0.5 * wrap(command - psi) - 1.0 * (r - rate)
         rudder = max(-RUDDER_LIMIT, min(RUDDER_LIMIT, rudder))
@@ -167,6 +180,24 @@ def _orbit(conditions: Conditions, process: PlanarProcess, start: Array, kicks: 
         states[k : k + STEPS + 1] = process.walk(states[k], inputs, TRUTH_STEP, kicks[k : k + STEPS])
         rudders.append(rudder)
     return states, np.array(rudders)
+
+
+def course_round(state: Array, radius: float) -> float:
+    """Course [rad] over ground clockwise round the dock, and back onto the circle of a radius [m] at up to 60 degrees.
+
+    Of the true planar state (8,).
+    """
+    north, east = state[:2].tolist()
+    bearing = math.atan2(east, north)  # of the vehicle from the dock
+    outside = (math.hypot(north, east) - radius) / max(5.0, 0.3 * radius)
+    return bearing + 0.5 * math.pi + math.radians(60.0) * math.tanh(outside)
+
+
+def heading_for(course: float, state: Array) -> float:
+    """Heading [rad] that makes good a course [rad] in the current of a true planar state (8,), if any does."""
+    u, v, _, c_n, c_e = state[3:].tolist()
+    across = -math.sin(course) * c_n + math.cos(course) * c_e
+    return course - math.asin(max(-0.9, min(0.9, across / math.hypot(u, v))))
 
 
 def _fixes(

@@ -4,12 +4,11 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from auvsim.reproduce.paper1_runs import TICK, Conditions, Run, Track, simulate, track
-from estimators.bounds import PosteriorBound
+from auvsim.reproduce.paper1_runs import TICK, Conditions, Track, Way, simulate, track
 from estimators.consistency import nees
 from estimators.docking import (
     INTERACTING_NOISE,
@@ -20,17 +19,17 @@ from estimators.docking import (
     InteractingFilter,
     PaperFilter,
 )
-from estimators.planar_filter import COMPASS, USBL, PlanarModels
 from estimators.planar_model import PRESTERO
-from estimators.types import Array
+
+C = TypeVar("C")
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Row:
+class Row(Generic[C]):
     """One line of the study."""
 
     title: str
-    conditions: Conditions
+    conditions: C  # of its runs
     window: tuple[float, float]  # the errors that count, first and last time [s]
     runs: int = 100  # of the full study
     quick_runs: int = 6
@@ -39,7 +38,7 @@ class Row:
 SETTLED = Conditions(duration=6000.0)
 STEADY, TURN = Conditions(), Conditions(turn=(120.0, 130.0))
 AFTER = (60.0, 300.0)
-ROWS: dict[str, Row] = {
+ROWS: dict[str, Row[Conditions]] = {
     **{
         f"settled_{radius}": Row(
             title=f"settled, {radius} m",
@@ -121,7 +120,8 @@ class Score:
     mean_square: float  # of the horizontal error [m^2]
     mean: float  # of the horizontal error [m]
     maximum: float  # [m]
-    nees: float  # of the position, mean per degree of freedom; NaN without a covariance
+    nees: float  # of the position, mean per degree of freedom
+    state_nees: float  # of all eight states; NaN where the covariance leaves some out
     refused: int  # fixes, outliers included
 
 
@@ -136,28 +136,31 @@ class Result:
     peak: float  # mean of the runs' maxima [m]
     worst_rms: float  # of one run [m]
     nees: float  # of the position per degree of freedom
+    state_nees: float  # of all eight states
     ratio: float  # rms by that of the reference
     ratio_deviation: float  # its standard deviation, by leaving out one run at a time; NaN of a single run
 
 
-def evaluate(row: Row, seed: int, filters: Sequence[str] = tuple(FILTERS)) -> dict[str, Score]:
+def evaluate(row: Row[Conditions], seed: int, filters: Sequence[str] = tuple(FILTERS)) -> dict[str, Score]:
     """The scores of filters in the run of a seed."""
     run = simulate(row.conditions, seed)
     return {name: score(row, run, track(run, FILTERS[name].make(), **FILTERS[name].options)) for name in filters}
 
 
-def score(row: Row, run: Run, followed: Track) -> Score:
+def score(row: Row, run: Way, followed: Track) -> Score:
     """The score of a track in the row's window; ticks before the first estimate do not count."""
     begin, end = row.window
     counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])
     errors = followed.errors(run)[counted]
-    P = followed.covariances[counted, :2, :2]
-    squares = nees(followed.means[counted, :2], P, run.states[counted, :2])
+    means, covariances, truths = followed.means[counted], followed.covariances[counted], run.states[counted]
+    squares = nees(means[:, :2], covariances[:, :2, :2], truths[:, :2])
+    holds_all = bool((np.diagonal(covariances, axis1=1, axis2=2) > 0.0).all())
     return Score(
         mean_square=float(np.mean(errors**2)),
         mean=float(errors.mean()),
         maximum=float(errors.max()),
         nees=float(squares.mean()) / 2.0,
+        state_nees=float(nees(means, covariances, truths, angles=(2,)).mean()) / 8.0 if holds_all else math.nan,
         refused=sum(followed.refused.values()),
     )
 
@@ -177,28 +180,7 @@ def summarise(scores: Sequence[Score], reference: Sequence[Score]) -> Result:
         peak=float(np.mean([s.maximum for s in scores])),
         worst_rms=math.sqrt(float(squares.max())),
         nees=float(np.mean([s.nees for s in scores])),
+        state_nees=float(np.mean([s.state_nees for s in scores])),
         ratio=math.sqrt(mean_square / float(base.mean())),
         ratio_deviation=deviation,
     )
-
-
-def bound(row: Row, seed: int) -> float:
-    """Mean square [m^2] of the posterior Cramér-Rao bound of the position in a row without turn or mishaps.
-
-    That of filters which know the truth's own noises and start as the augmented filter does, given the true way.
-    """
-    run = simulate(row.conditions, seed)
-    models = PlanarModels(PRESTERO, REFERENCE_NOISE)
-
-    def truths(time: float) -> Array:
-        return np.array([[np.interp(time, run.times, column) for column in run.states.T]])
-
-    def first(nodes: Sequence[Any], index: int) -> Array | None:
-        start = models.first(nodes, index)
-        return None if start is None else start[0].covariance
-
-    sensors = {COMPASS: models.heading, USBL: models.position}
-    followed = track(run, PosteriorBound(models.process, sensors, truths, first, REFERENCE_NOISE))
-    begin, end = row.window
-    counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])
-    return float(np.trace(followed.covariances[counted, :2, :2], axis1=1, axis2=2).mean())

@@ -15,6 +15,8 @@ class Reading:
     | feedback | (n + 1,) the n fin angles [rad] in the order of the allocation, then shaft speed [rad/s] |
     | usbl     | (7,) transponder in the dock's frame x, y, z [m], dock heading, pitch, roll [rad],       |
     |          | dock depth [m]                                                                           |
+    | dvl      | (6,) u, v, w over ground, then through the water [m/s]; NaN where that track is lost     |
+    | gyro     | (3,) p, q, r [rad/s]                                                                     |
     """
 
     sensor: str

@@ -90,7 +90,7 @@ def verdict(playback: Playback) -> str:
     for kind, text, time in zip(kinds[::-1], texts[::-1], times[::-1], strict=True):
         if kind == "docked":
             return f"docked after {time:.0f} s, attempt {playback.at(float(time)).attempt}"
-        if kind in ("aborted", "timeout", "diverged", "interrupted"):
+        if kind in ("aborted", "timeout", "diverged", "interrupted", "manoeuvre"):
             return f"{kind}: {text}"
     return f"not docked ({log.attributes['status']})"
 

@@ -162,20 +162,22 @@ def test_a_strange_mujoco_is_refused_before_anything_is_installed(monkeypatch):
         mujoco.set_mjcb_passive(callback)
 
 
-def test_compiled_code_older_than_the_forces_is_forgotten(monkeypatch, tmp_path):
+@pytest.mark.parametrize("changed", ["forces.py", "pointers.py"])
+def test_compiled_code_older_than_what_it_holds_is_forgotten(monkeypatch, tmp_path, changed):
     """Numba's cache would go on with yesterday's forces: it looks only at the file of the function that it keeps."""
-    forces, folder = tmp_path / "forces.py", tmp_path / "cache"
+    folder = tmp_path / "cache"
     folder.mkdir()
-    forces.touch()
+    for name in ("forces.py", "pointers.py"):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (0.0, 0.0))
     for name in ("fluid._hull-1.nbi", "fluid._build.passive-1.nbi", "forces.hull_force-1.nbi"):
         (folder / name).touch()
     monkeypatch.setattr(fluid, "__file__", str(tmp_path / "fluid.py"))
     monkeypatch.setattr(fluid, "FunctionCache", lambda function: SimpleNamespace(cache_path=str(folder)))
     monkeypatch.setattr(fluid, "_callback", None)
-    now = forces.stat().st_mtime
-    os.utime(forces, (now - 100, now - 100))
     assert fluid.is_warm()
     assert len(list(folder.iterdir())) == 3
-    os.utime(forces, (now + 100, now + 100))
+    later = max(path.stat().st_mtime for path in folder.iterdir()) + 100.0
+    os.utime(tmp_path / changed, (later, later))
     assert not fluid.is_warm()
     assert [path.name for path in folder.iterdir()] == ["forces.hull_force-1.nbi"]

@@ -150,7 +150,7 @@ def test_netcdf_that_is_no_trial_log(file: Path):
         read(file)
     with h5py.File(file, "a") as content:
         content.attrs["format_version"] = 99
-    with pytest.raises(InputError, match="log format 99; this auvsim reads 1"):
+    with pytest.raises(InputError, match="log format 99; this auvsim reads 1 and 2"):
         read(file)
     with h5py.File(file, "a") as content:
         del content.attrs["seed"]
@@ -214,3 +214,15 @@ def test_the_printed_table_has_every_variable():
         rows = lines[start + 4 : start + 4 + len(variables)]
         assert [row.split("|")[1].strip() for row in rows] == list(variables)
         assert all(row.count("|") == 7 for row in rows)  # no cell breaks the table
+
+
+def test_logs_of_version_1_are_read_with_empty_groups(log: TrialLog, file: Path):
+    """They knew neither DVL nor gyro; everything else is as it was."""
+    with h5py.File(file, "a") as content:
+        del content["dvl"]
+        del content["gyro"]
+        content.attrs["format_version"] = 1
+    again = read(file)
+    assert differences(log, again) == []
+    assert again["dvl"]["value"].shape == (0, 6)
+    assert again["gyro"]["value"].shape == (0, 3)

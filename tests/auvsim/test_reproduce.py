@@ -16,6 +16,7 @@ from auvsim.reproduce.paper1_study import FILTERS, ROWS, evaluate
 
 SHORT = ("start", "late")
 RUNS = 2
+PLANAR = ("--truth", "planar")  # on MuJoCo's truth see test_reproduce_mujoco
 FILES = {"study.csv", "acceptance.csv", "table1.csv", "figure6.png", "figure7.png", "study.png"}
 
 
@@ -32,11 +33,17 @@ def short(monkeypatch):
 
 def settled(study, **changed):
     """The study with a settled row whose filters all have the results of another row, but for `changed` ratios."""
-    results = {name: replace(result, mean=0.1011, nees=1.0) for name, result in study.results["late"].items()}
+    results = {
+        name: replace(result, mean=0.1011, nees=1.0, state_nees=result.state_nees / result.state_nees)  # NaN stays
+        for name, result in study.results["late"].items()
+    }
     results |= {name: replace(results[name], ratio=ratio) for name, ratio in changed.items()}
-    bounds = {"settled_40": results["augmented_constant"].rms}
     return replace(
-        study, results=study.results | {"settled_40": results}, runs=study.runs | {"settled_40": 4}, bounds=bounds
+        study,
+        results=study.results | {"settled_40": results},
+        runs=study.runs | {"settled_40": 4},
+        bounds={"settled_40": results["augmented_constant"].rms},
+        batches={"settled_40": 1.0},
     )
 
 
@@ -47,7 +54,7 @@ def read(path):
 
 def test_the_command_prints_and_writes_the_study(short, study, tmp_path, capsys):
     out = tmp_path / "new" / "folder"
-    assert cli.main(["reproduce", "paper1", "--seed", "5", "--jobs", "1", "--out", str(out)]) == 0
+    assert cli.main(["reproduce", "paper1", *PLANAR, "--seed", "5", "--jobs", "1", "--out", str(out)]) == 0
     printed, said = capsys.readouterr()
     for name in SHORT:
         line = next(line for line in printed.splitlines() if line.startswith(f" {ROWS[name].title}"))
@@ -101,7 +108,8 @@ def test_tables_hold_every_row_and_filter(study, tmp_path):
         assert float(line["rms_m"]) == pytest.approx(result.rms, rel=1e-5)  # six digits are written
         assert float(line["ratio_low"]) <= float(line["ratio"]) <= float(line["ratio_high"])
         # A filter without the current in its covariance claims nothing to be judged by.
-        assert (line["nees_per_dof"] == "") == (line["filter"] in list(FILTERS)[:6])
+        for column in ("nees_per_dof", "state_nees_per_dof"):
+            assert (line[column] == "") == (line["filter"] in list(FILTERS)[:6])
         assert (line["bound_m"] == "") == (line["row"] != "settled_40")
     (line,) = read(tmp_path / "table1.csv")
     assert (line["distance_m"], line["paper_mean_m"], line["paper_variance_m2"]) == ("40", "0.1011", "0.0045")
@@ -158,6 +166,7 @@ def test_every_row_has_something_to_reach(study):
         (["paper1", "--jobs", "0"], "--jobs 0 must be 1 or more"),
         (["paper1", "--seed", "one"], "seed"),
         (["paper1", "--runs", "3"], "--runs"),
+        (["paper1", "--truth", "real"], "mujoco"),
         (["paper3"], "paper1"),
         ([], "reproduce"),
     ],

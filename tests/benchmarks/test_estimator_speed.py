@@ -4,7 +4,11 @@ Run with `pytest tests/benchmarks/test_estimator_speed.py --benchmark-enable`; t
 (`pip install auvsim[compare]`) are handed the same compiled model, so that only the filters themselves are compared.
 """
 
+import multiprocessing
+import time
+from concurrent.futures import ProcessPoolExecutor
 from datetime import datetime, timedelta
+from functools import partial
 
 import numpy as np
 import pytest
@@ -129,3 +133,29 @@ def test_hundred_seconds_of_a_filter(benchmark, name):
     run = simulate(Conditions(duration=100.0), 1)
     tracked = benchmark(lambda: track(run, FILTERS[name].make()))
     assert np.isfinite(tracked.means[-1]).all()
+
+
+def simulated_and_followed(name, duration, seed):
+    """Seconds that one run's simulation took, and the filter over it."""
+    begin = time.perf_counter()
+    run = simulate(Conditions(duration=duration), seed)
+    middle = time.perf_counter()
+    assert np.isfinite(track(run, FILTERS[name].make()).means[-1]).all()
+    return middle - begin, time.perf_counter() - middle
+
+
+@pytest.mark.parametrize("name", ["augmented_constant", "imm"])
+def test_hundred_runs_of_6000_s_on_two_cores(benchmark, name):
+    """The whole batch, with the start of its two processes; without --benchmark-enable only a taste of it.
+
+    Ticks are 0.5 s apart, fixes 5 s. `extra_info` has what simulations and filters took of it.
+    """
+    runs, duration = (100, 6000.0) if benchmark.enabled else (2, 20.0)
+
+    def batch():
+        with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+            work = partial(simulated_and_followed, name, duration)
+            return np.array(list(pool.map(work, range(runs), chunksize=1)))
+
+    parts = benchmark.pedantic(batch, rounds=1).sum(axis=0) / 2.0
+    benchmark.extra_info |= {"simulations [s]": round(parts[0], 1), "filters [s]": round(parts[1], 1)}

@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvsim.reproduce.paper1_runs import Conditions, in_order, simulate, track
-from auvsim.reproduce.paper1_study import FILTERS, ROWS, bound, evaluate, score, summarise
+from auvsim.reproduce.paper1_runs import Conditions, follow, in_order, simulate, track
+from auvsim.reproduce.paper1_study import FILTERS, ROWS, evaluate, score, summarise
+from auvsim.reproduce.paper1_yardsticks import bound
 from estimators.consistency import assess, interval, ljung_box, nees, nis, whiten
 from estimators.docking import REFERENCE_NOISE, AugmentedFilter, DockingEstimator
 from estimators.planar_model import PRESTERO
@@ -118,12 +119,8 @@ def test_errors_and_innovations_of_the_augmented_filter_are_consistent():
     for seed in range(3500, 3516):
         run = in_order(simulate(Conditions(duration=300.0), seed))
         estimator = DockingEstimator(AugmentedFilter(PRESTERO, REFERENCE_NOISE, gate=None), run.usbl)
-        arrived, row, residuals, last = 0, [], [], None
-        for k, time in enumerate(run.times.tolist()):
-            first = arrived
-            while arrived < len(run.fixes) and run.fixes[arrived].received <= time:
-                arrived += 1
-            estimate = estimator.tick(time, run.compass[k], run.rudder[k], 0.0, run.fixes[first:arrived])
+        row, residuals, last = [], [], None
+        for k, estimate in enumerate(follow(run, estimator)):
             if estimate.innovation is not None and estimate.innovation is not last:
                 last = estimate.innovation
                 residuals.append((last.residual, last.covariance))

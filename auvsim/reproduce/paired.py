@@ -1,0 +1,108 @@
+"""Paired runs of a study: every filter follows the same runs, which rows of the same conditions share, on all cores."""
+
+import multiprocessing
+import os
+import signal
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Future, ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from functools import partial
+from itertools import groupby
+from typing import Any
+
+from auvsim.reproduce.paper1_runs import Track, Way
+from auvsim.reproduce.paper1_study import Result, Row, Score, score, summarise
+
+REFERENCE = "paper"  # the filter by which the others' errors are divided
+SEEDS_APART = 1_000_000  # more than any row has runs: no two seeds of a study share a run
+Progress = Callable[[float, float], None]  # told what is done, and the total of it
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Task:
+    """Something to do in a process of its own."""
+
+    key: tuple
+    work: Callable[[], Any]
+    weight: float  # what it takes, in simulated seconds of all filters
+
+
+def run_seed(seed: int, number: int) -> int:
+    """Seed of a run of the study; the rows share it, so that they too are paired."""
+    return SEEDS_APART * seed + number
+
+
+def score_tasks(
+    rows: Mapping[str, Row], counts: Mapping[str, int], seed: int, scores: Callable[[Mapping[str, Row], int], Any]
+) -> list[Task]:
+    """One task for each run of each conditions.
+
+    Args:
+        rows: All there are.
+        counts: Runs, of the rows to do.
+        seed: Of the study.
+        scores: Gives the scores by row and filter, of rows of the same conditions in the run of a seed; what is given
+            to it, and itself, must go to another process.
+    """
+
+    def conditions(name: str) -> str:
+        return conditions_key(rows, name)
+
+    tasks = []
+    for key, group in groupby(sorted(counts, key=conditions), key=conditions):
+        alike = {name: rows[name] for name in group}
+        for k in range(max(counts[name] for name in alike)):
+            work = partial(scores, alike, run_seed(seed, k))
+            tasks.append(Task(key=("scores", key, k), work=work, weight=rows[key].conditions.duration))
+    return tasks
+
+
+def scores(rows: Mapping[str, Row], run: Way, tracks: Mapping[str, Track]) -> dict[str, dict[str, Score]]:
+    """By row and filter, of tracks by filter, of one run."""
+    return {name: {key: score(row, run, followed) for key, followed in tracks.items()} for name, row in rows.items()}
+
+
+def results(
+    done: Mapping[tuple, Any], rows: Mapping[str, Row], counts: Mapping[str, int]
+) -> dict[str, dict[str, Result]]:
+    """By row and filter, of what `run_tasks` did of `score_tasks`."""
+    found = {}
+    for name, count in counts.items():
+        runs: list[dict[str, Score]] = [done["scores", conditions_key(rows, name), k][name] for k in range(count)]
+        reference = [run[REFERENCE] for run in runs]
+        found[name] = {key: summarise([run[key] for run in runs], reference) for key in runs[0]}
+    return found
+
+
+def conditions_key(rows: Mapping[str, Row], name: str) -> str:
+    """The first row that has the conditions of this one: the same runs, seen through another window."""
+    return next(other for other, row in rows.items() if row.conditions == rows[name].conditions)
+
+
+def run_tasks(tasks: Sequence[Task], jobs: int | None, progress: Progress | None) -> dict[tuple, Any]:
+    """What the tasks came to by their keys, in processes of their own, as many as there are cores if `jobs` is None."""
+    tasks = sorted(tasks, key=lambda task: -task.weight)  # the long ones first, so that no core waits at the end
+    total, sofar = sum(task.weight for task in tasks), 0.0
+    # Spawned, not forked: BLAS and numba may hold threads and locks of this process.
+    pool = ProcessPoolExecutor(
+        min(jobs or os.cpu_count() or 1, len(tasks)),
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_die_of_interrupts,
+    )
+    try:
+        futures: dict[Future, Task] = {pool.submit(task.work): task for task in tasks}
+        done = {}
+        for future in as_completed(futures):
+            task = futures[future]
+            done[task.key] = future.result()
+            sofar += task.weight
+            if progress:
+                progress(sofar, total)
+        return {task.key: done[task.key] for task in tasks}
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+def _die_of_interrupts() -> None:
+    """Ctrl-C reaches the workers too: they go at once and silently, and the parent says what happened."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
