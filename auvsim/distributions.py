@@ -26,25 +26,25 @@ def _numbers(parameters: Any, *names: str) -> list[float]:
     return [float(number) for number in parameters]
 
 
-def _bounds(parameters: Any) -> list[float]:
+def _bounds(parameters: Any) -> tuple[float, float]:
     low, high = _numbers(parameters, "low", "high")
     if low > high:
         raise ValueError("low must not exceed high")
-    return [low, high]
+    return low, high
 
 
-def _logarithms(parameters: Any) -> list[float]:
+def _logarithms(parameters: Any) -> tuple[float, float]:
     low, high = _numbers(parameters, "low", "high")
     if not 0.0 < low <= high:
         raise ValueError("needs 0 < low <= high")
-    return [math.log(low), math.log(high)]
+    return math.log(low), math.log(high)
 
 
-def _mean_and_deviation(parameters: Any) -> list[float]:
+def _mean_and_deviation(parameters: Any) -> tuple[float, float]:
     mean, deviation = _numbers(parameters, "mean", "standard deviation")
     if deviation < 0.0:
         raise ValueError("the standard deviation must not be negative")
-    return [mean, deviation]
+    return mean, deviation
 
 
 def _options(parameters: Any) -> Any:

@@ -1,6 +1,5 @@
 """The picture of a manoeuvre, from its log alone: track, heading, rudder, yaw rate and surge, true and measured."""
 
-import math
 import os
 from pathlib import Path
 from typing import Any
@@ -15,7 +14,6 @@ from auvsim.dock_frame import to_body
 from auvsim.drawing import DOCK, WATER, dress, legend
 from auvsim.errors import InputError
 from auvsim.files import whole
-from auvsim.frames import Array
 from auvsim.log import TrialLog
 from auvsim.manoeuvre_settings import SpiralSettings
 
@@ -35,7 +33,7 @@ def manoeuvre(log: TrialLog, path: str | os.PathLike[str]) -> None:
     """Writes the picture of a manoeuvre (PNG).
 
     Raises:
-        InputError: the log is that of a docking trial, or the file cannot be written.
+        InputError: the log is that of a docking trial or holds nothing, or the file cannot be written.
     """
     figure = manoeuvre_figure(log)
     try:
@@ -48,6 +46,8 @@ def manoeuvre(log: TrialLog, path: str | os.PathLike[str]) -> None:
 def manoeuvre_figure(log: TrialLog) -> Figure:
     """The figure that `manoeuvre` writes."""
     parts = manoeuvre_metrics.parts(log)
+    if not len(log["truth"]["time"]):
+        raise InputError("nothing was logged of this manoeuvre: there is nothing to draw")
     figure = Figure(figsize=SIZE, layout="constrained")
     grid = figure.add_gridspec(4, 2, width_ratios=(1.0, 1.25))
     spirals = [part for part in parts if isinstance(part.settings, SpiralSettings)]
@@ -117,17 +117,10 @@ def _spirals(axes: Axes, log: TrialLog) -> None:
     axes.legend(loc="best", fontsize=9.5)
 
 
-def _unwrapped(heading: Array, first: float) -> Array:
-    """Measured headings [rad] without jumps, from the turn in which `first` is."""
-    if not len(heading):
-        return heading
-    return first + np.unwrap(np.concatenate([[first], heading]))[1:] - first
-
-
 def _heading(axes: Axes, log: TrialLog) -> None:
     truth, compass, guidance = log["truth"], log["compass"], log["guidance"]
     heading = np.unwrap(truth["attitude"][:, 2])
-    measured = _unwrapped(compass["value"][:, 0], float(heading[0]))
+    measured = np.unwrap(np.concatenate([heading[:1], compass["value"][:, 0]]))[1:]  # in the turn of the truth
     axes.plot(compass["time"], np.degrees(measured), **MEASURED)
     axes.plot(truth["time"], np.degrees(heading), **TRUTH)
     course = np.degrees(guidance["heading_command"])
@@ -153,6 +146,4 @@ def _surge(axes: Axes, log: TrialLog) -> None:
     axes.plot(truth["time"], through[:, 0], **TRUTH)
     axes.step(guidance["time"], guidance["speed_command"], where="post", **COMMAND)
     spread = np.concatenate([through[:, 0], guidance["speed_command"]])
-    low, high = float(spread.min(initial=math.inf)), float(spread.max(initial=-math.inf))
-    if math.isfinite(low):
-        axes.set(ylim=(low - 0.15, high + 0.15))  # room for the noise
+    axes.set(ylim=(spread.min() - 0.15, spread.max() + 0.15))  # room for the noise

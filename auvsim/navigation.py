@@ -24,9 +24,15 @@ from auvsim.frames import Array, wrap
 from auvsim.sensors.reading import Reading
 from auvsim.settings import Settings
 from estimators.docking import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
+from estimators.outliers import Outliers
 from estimators.planar_filter import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.planar_model import PlanarParameters
 from estimators.usbl import UsblFix, UsblModel
+
+TURN = 10.0  # mean duration of a turn of the current that the interacting filters expect [s]
+SETTLING = 50.0  # mean time after it for which its memory is kept apart [s]
+# An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the begin of a turn.
+GROSS = Outliers(prior=0.02, deviations=(15.0,))
 
 
 class Commands(NamedTuple):
@@ -80,8 +86,15 @@ class EstimatorSettings(Settings):
     current_noise: float = Field(
         default=1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
     )
+    steady_noise: float = Field(
+        default=1e-6, ge=0, description="random walk of the current in the steady modes of the imm [m2/s3]"
+    )
     turning_noise: float = Field(
-        default=0.02, ge=0, description="random walk of the current in the second mode of the imm [m2/s3]"
+        default=0.04, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
+    )
+    turn_interval: float = Field(default=1000.0, gt=0, description="mean time between turns the imm expects [s]")
+    compass_bias_deg: float = Field(
+        default=0.5, ge=0, description="constant error of the vehicle's compass that the imm estimates [deg]"
     )
     dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it believes [deg]")
     dock_heading_state: bool = Field(
@@ -227,20 +240,34 @@ def ukf(parameters: PlanarParameters, scenario: Any) -> Navigator:
 
 
 def imm(parameters: PlanarParameters, scenario: Any) -> Navigator:
-    """Two interacting augmented filters, for steady and turning currents (paper 1, section 13)."""
-    return _interacting(parameters, scenario, _noise(scenario))
+    """Interacting augmented filters, for steady and turning currents (paper 1, section 13), with the compass' error."""
+    return _interacting(parameters, scenario, {})
 
 
 def imm_biased(parameters: PlanarParameters, scenario: Any) -> Navigator:
-    """The same with the errors of thrust and compass in the state."""
-    noise = _noise(scenario)
-    return _interacting(parameters, scenario, replace(noise, biases={**BIASES_OF_VEHICLE, **noise.biases}))
+    """The same with the error of thrust in the state too."""
+    return _interacting(parameters, scenario, {"surge": BIASES_OF_VEHICLE["surge"]})
 
 
-def _interacting(parameters: PlanarParameters, scenario: Any, noise: DockingNoise) -> Navigator:
+def _interacting(parameters: PlanarParameters, scenario: Any, biases: Mapping[str, Bias]) -> Navigator:
+    """Three modes: steady, turning, and steady again after a turn.
+
+    What the turning mode does not know must not leak into the steady one, so that it is believed for long before. Only
+    then is the steady mode's covariance mixed with one that has long converged.
+    """
     s: EstimatorSettings = scenario.estimator
-    kind = partial(InteractingFilter, currents=(s.current_noise, s.turning_noise))
-    return _docking(parameters, scenario, kind, noise)
+    noise = _noise(scenario)
+    compass = {"compass": Bias(math.radians(s.compass_bias_deg))} if s.compass_bias_deg > 0.0 else {}
+    turns, ends, settles = 1.0 / s.turn_interval, 1.0 / TURN, 1.0 / SETTLING
+    shares = np.array((1.0, turns / settles, turns / ends))  # nearly those of the chain when it has run for long
+    kind = partial(
+        InteractingFilter,
+        currents=(s.steady_noise, s.steady_noise, s.turning_noise),
+        switching=((0.0, 0.0, turns), (settles, 0.0, turns), (0.0, ends, 0.0)),
+        initial=shares / shares.sum(),
+        outliers=GROSS,
+    )
+    return _docking(parameters, scenario, kind, replace(noise, biases={**compass, **biases, **noise.biases}))
 
 
 def _noise(scenario: Any) -> DockingNoise:

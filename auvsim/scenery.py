@@ -95,19 +95,34 @@ def add_pillar(root: Any, sea_floor: float, dock_depth: float, forward: Array) -
         dock_depth: depth of the dock's mouth [m].
         forward: (2,) place of the pillar's axis in MuJoCo's world, x and y [m].
     """
-    if sea_floor > dock_depth + PILLAR_TOP:
-        x, y = forward.tolist()
+    if _has_pillar(sea_floor, dock_depth):
         root.worldbody.add(
             "geom",
             name="pillar",
             type="cylinder",
             size=(0.12,),
-            fromto=(x, y, -dock_depth - PILLAR_TOP, x, y, -sea_floor),
+            fromto=_pillar_ends(sea_floor, dock_depth, forward),
             contype=0,
             conaffinity=0,
             group=1,
             rgba=METAL,
         )
+
+
+def _has_pillar(sea_floor: float, dock_depth: float) -> bool:
+    """Whether there is room for one."""
+    return sea_floor > dock_depth + PILLAR_TOP
+
+
+def turn_pillar(spec: mujoco.MjSpec, sea_floor: float, dock_depth: float, forward: Array) -> None:
+    """Puts the pillar of a scene elsewhere; arguments as of `add_pillar`."""
+    if _has_pillar(sea_floor, dock_depth):
+        spec.geom("pillar").fromto = _pillar_ends(sea_floor, dock_depth, forward)
+
+
+def _pillar_ends(sea_floor: float, dock_depth: float, forward: Array) -> tuple[float, ...]:
+    x, y = forward.tolist()
+    return x, y, -dock_depth - PILLAR_TOP, x, y, -sea_floor
 
 
 def paint_sea_floor(model: mujoco.MjModel) -> None:

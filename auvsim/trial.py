@@ -5,9 +5,10 @@ import time as wall
 from collections.abc import Callable
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
-from auvsim import condense, library, manoeuvres, navigation, planar_sets, scenario
+from auvsim import condense, library, manoeuvres, navigation, planar_sets, scenario, scenes
 from auvsim.acoustics import Channel
 from auvsim.control import Autopilot
 from auvsim.currents import build_current
@@ -77,15 +78,17 @@ class Loop:
     """The parts of a trial and one turn of its loop, of one control period."""
 
     def __init__(self, plan: scenario.Scenario, seed: int, trial: int) -> None:
-        vehicle, dock = library.vehicle(plan.vehicle.model), library.dock(plan.dock.model)
         pose = DockPose(depth=plan.dock.depth, heading=math.radians(plan.dock.heading_deg))
+        scene = scenes.compiled(plan.vehicle.model, plan.dock.model, pose, plan.world, plan.rates.physics)
+        vehicle, dock = scene.vehicle, scene.dock
         name, rates = vehicle.name, plan.rates
 
         def noise(sensor: str) -> np.random.Generator:
             return stream(seed, trial, f"{name}/{sensor}")
 
         self.current = build_current(plan.current, noise("current"), plan.duration + 1.0)
-        self.world = World.build(vehicle, dock, pose, self.current, plan.world, rates.physics)
+        data = mujoco.MjData(scene.model)
+        self.world = World(scene.model, data, vehicle, pose, self.current, plan.world.water_density)
         estimator, density = plan.estimator, plan.world.water_density
         # What the shaft speed of a command is stays condensed, so that trials differ in nothing but the estimator.
         believed = condense.condense(plan.vehicle.model, estimator.model_speed, density)

@@ -53,8 +53,7 @@ def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settin
     quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
     place = root.worldbody.add("site", name="dock", pos=(0, 0, -pose.depth), quat=quaternion, rgba=(0, 0, 0, 0))
     place.attach(dock.root)
-    ahead = np.array([np.cos(pose.heading), -np.sin(pose.heading)])
-    scenery.add_pillar(root, settings.sea_floor, pose.depth, (dock.cone_length + 0.3) * ahead)
+    scenery.add_pillar(root, settings.sea_floor, pose.depth, pillar_place(dock, pose))
     frame = root.worldbody.attach(vehicle.root)
     frame.add("freejoint")
     root.sensor.add(
@@ -72,6 +71,11 @@ def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settin
     return root
 
 
+def pillar_place(dock: library.Dock, pose: DockPose) -> Array:
+    """Where the axis of the dock's pillar is: (2,) x and y in MuJoCo's world [m]."""
+    return (dock.cone_length + 0.3) * np.array([np.cos(pose.heading), -np.sin(pose.heading)])
+
+
 def compile_scene(root: Any) -> mujoco.MjModel:
     """Compiles a composed scene.
 
@@ -81,7 +85,12 @@ def compile_scene(root: Any) -> mujoco.MjModel:
     try:
         return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
     except ValueError as error:
-        raise InputError(f"scene '{root.model}': {' '.join(str(error).split())[:300]}") from None
+        raise refused(root.model, error) from None
+
+
+def refused(scene: str, error: ValueError) -> InputError:
+    """MuJoCo's reason for not compiling a scene, in one line."""
+    return InputError(f"scene '{scene}': {' '.join(str(error).split())[:300]}")
 
 
 class World:

@@ -91,5 +91,5 @@ def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> Gaussia
     mean, covariance, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
     if status != loops.OK:
         residual = np.array([loops.wrap(value[0] - H[0] @ belief.mean)])
-        return correct_linear(belief, H, residual, R)[0]  # raises, with the reason
+        return correct_linear(belief, H, residual, R)[0]  # says what is wrong
     return Gaussian(mean=mean, covariance=covariance)

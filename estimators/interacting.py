@@ -2,21 +2,23 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple
+from typing import NamedTuple, Unpack
 
 import numpy as np
+from scipy.linalg import expm
 
 from estimators import ekf, imm, outliers, recovery
 from estimators.ekf import Innovation
 from estimators.errors import ParameterError
 from estimators.history import Input, Node
 from estimators.outliers import Doubtful, Outliers
-from estimators.planar_filter import COMPASS, ROBUST_NOISE, USBL, DockingNoise, PlanarModels
-from estimators.planar_model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
+from estimators.planar_filter import COMPASS, ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.planar_model import PlanarParameters, PlanarProcess
 from estimators.recovery import Rejected
 from estimators.types import Array, Gaussian, Measurement
 
 ANGLES = (2,)  # the heading
+SHORTEST = 0.1  # time between fixes that counts at least, so that no mode ever dies out [s]
 TRUSTED = 3  # fixes taken before the filter believes itself more than two fixes that agree against it
 
 
@@ -25,6 +27,7 @@ class InteractingState(NamedTuple):
 
     beliefs: tuple[Gaussian, ...]
     weights: Array  # (m,) probabilities of the modes
+    last_fix: float  # stamp of the last fix [s]
     accepted: int = 1  # fixes taken so far
     outliers: int = 0  # fixes more probably wrong than not, so far
     rejected: tuple[Rejected, ...] = ()
@@ -39,8 +42,9 @@ class InteractingState(NamedTuple):
 class InteractingFilter:
     """Interacting extended Kalman filters that differ in how fast the current may change (sec. 13), for a `History`.
 
-    Each fix is weighed against being an outlier in each mode, and modes may change right after it. The compass says
-    nothing of the modes, which share the heading.
+    Each fix is weighed against being an outlier in each mode. Modes change at constant rates, however often
+    fixes come: right after a fix, by what the time since the fix before it allows. The compass says nothing of the
+    modes, which share the heading.
 
     A filter that takes good fixes for outliers, because it is wrong itself, is set right as `AugmentedFilter` is, by
     fixes that agree against it: by two if it has taken fewer than three, as after a wrong first fix, else by three.
@@ -49,10 +53,10 @@ class InteractingFilter:
         parameters: The vehicle.
         noise: What it believes of its noise, but for the current's; and the biases that it estimates besides.
         currents: Random walk of the current in each mode [m^2/s^3], the slowest first.
-        transition: (m, m) probability of changing from mode i (row) to mode j (column), each fix.
+        switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at the first fix (m,).
         outliers: What is believed of fixes that are wrong.
-        transponder, initial_surge, integrator, max_substep: See `PlanarModels`.
+        **options: See `PlanarModels`.
     """
 
     def __init__(
@@ -61,31 +65,18 @@ class InteractingFilter:
         noise: DockingNoise = ROBUST_NOISE,
         *,
         currents: Sequence[float] = (1e-8, 0.02),
-        transition: Sequence[Sequence[float]] = ((0.997, 0.003), (0.01, 0.99)),
+        switching: Sequence[Sequence[float]] = ((0.0, 6e-4), (2e-3, 0.0)),
         initial: Sequence[float] = (0.5, 0.5),
         outliers: Outliers | None = None,
-        transponder: tuple[float, float] = (0.0, 0.0),
-        initial_surge: float | None = None,
-        integrator: Integrator = "midpoint",
-        max_substep: float = MAX_SUBSTEP,
+        **options: Unpack[ModelOptions],
     ) -> None:
         self.parameters, self.noise = parameters, noise
-        self._transition, self._initial = np.array(transition, dtype=float), np.array(initial, dtype=float)
-        m = len(currents)
-        rows = np.vstack((self._initial, self._transition)) if self._transition.shape == (m, m) else np.zeros((1, m))
-        if self._initial.shape != (m,) or (rows <= 0.0).any() or np.abs(rows.sum(axis=1) - 1.0).max() > 1e-9:
-            raise ParameterError(
-                f"{m} modes need as many initial probabilities and rows of transition, above 0 and of sum 1 each; not "
-                f"{list(initial)} and {[list(row) for row in transition]}"
-            )
-        self.models = PlanarModels(
-            parameters,
-            noise,
-            transponder=transponder,
-            initial_surge=initial_surge,
-            integrator=integrator,
-            max_substep=max_substep,
-        )
+        rates, self._initial = np.array(switching, dtype=float), np.array(initial, dtype=float)
+        self._generator = _generator(rates, len(currents))
+        shaped = self._initial.shape == (len(currents),) and (self._initial > 0.0).all()
+        if not (shaped and abs(self._initial.sum() - 1.0) < 1e-9):
+            raise ParameterError(f"initial {list(initial)} must be {len(currents)} probabilities above 0 of sum 1")
+        self.models = PlanarModels(parameters, noise, **options)
         self._currents = np.array(currents, dtype=float)
         self._processes = [self.models.process_with(replace(noise, current=current)) for current in currents]
         self._outliers = outliers or Outliers()
@@ -97,7 +88,7 @@ class InteractingFilter:
             return None
         belief, fix = first
         others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        state = InteractingState((belief,) * len(self._processes), self._initial)
+        state = InteractingState((belief,) * len(self._processes), self._initial, fix.stamp)
         return self.correct(state, nodes[index].time, others)
 
     def predict(self, state: InteractingState, u: Input, duration: float) -> InteractingState:
@@ -136,15 +127,34 @@ class InteractingFilter:
                 earlier = agreeing[0] if agreeing else state.rejected[-1]
                 recovered = recovery.recover(state.belief, earlier, now, self.noise)
                 beliefs = (recovered,) * len(modes)
-                return InteractingState(beliefs, self._initial, 2, count - len(agreeing), (), innovation)
+                return InteractingState(beliefs, self._initial, fix.stamp, 2, count - len(agreeing), (), innovation)
             rejected = (*state.rejected, now)
             count += 1
         accepted = state.accepted + (not rejected)
-        beliefs, weights = imm.mix([mode.belief for mode in modes], weights, self._transition, ANGLES)
-        return InteractingState(beliefs, weights, accepted, count, rejected, innovation)
+        transition = expm(max(SHORTEST, fix.stamp - state.last_fix) * self._generator)
+        beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)
+        return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation)
 
     def _rejected(self, state: InteractingState, fix: Measurement, modes: Sequence[Doubtful]) -> Rejected:
         """The fix as seen by the modes together, before it was used."""
         residual = np.sum([w * m.innovation.residual for w, m in zip(state.weights, modes, strict=True)], axis=0)
         H = self.models.position.jacobian(state.belief.mean)
         return Rejected(fix.stamp, residual, H, fix.covariance)
+
+
+def _generator(rates: Array, modes: int) -> Array:
+    """Rates of a Markov chain (m, m) with the diagonal that makes its rows sum to zero.
+
+    Raises:
+        ParameterError: They are not rates between that many modes, or leave a mode that is never reached.
+    """
+    Q = rates.copy() if rates.shape == (modes, modes) else np.full((modes, modes), -1.0)
+    np.fill_diagonal(Q, 0.0)
+    # Every mode leads to every other, at once or by way of others.
+    if (Q < 0.0).any() or not (np.linalg.matrix_power(np.eye(modes) + (Q > 0.0), modes) > 0.0).all():
+        raise ParameterError(
+            f"{modes} modes need a row and a column of switching rates each, none below 0, that lead from every mode "
+            f"to every other; not {rates.tolist()}"
+        )
+    np.fill_diagonal(Q, -Q.sum(axis=1))
+    return Q

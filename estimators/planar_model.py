@@ -169,7 +169,7 @@ def planar_kernels(*, current: bool = True, integrator: Integrator = "midpoint",
 def is_warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> bool:
     """Whether a filter on this model starts at once; if not, its first use compiles for some seconds."""
     kernels = planar_kernels(current=current, integrator=integrator, biases=biases)
-    return is_ready(kernels.predict) and is_ready(loops.correct)
+    return all(map(is_ready, (kernels.predict, loops.correct, loops.correct_angle)))
 
 
 def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> None:
@@ -178,6 +178,7 @@ def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: B
     process = PlanarProcess(PRESTERO, np.zeros(n), integrator=integrator, biases=biases)
     mean, covariance, _ = process.propagate(np.zeros(n), np.eye(n), (0.0, 0.0), 0.1)
     loops.correct(mean, covariance, np.eye(1, n), np.zeros(1), np.eye(1), math.inf)
+    loops.correct_angle(mean, covariance, np.eye(1, n), np.zeros(1), np.eye(1))
     loops.wrap(0.0)
 
 

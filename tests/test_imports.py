@@ -9,7 +9,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 LINES = """
     renderer errors settings files yaml_text schema frames truth randomness interpolation current_settings currents
-    forces layout pointers fluid hydrodynamics allocation library condense planar_sets scenery world planar_world
+    forces layout pointers fluid hydrodynamics allocation library condense planar_sets scenery world scenes planar_world
     acoustics sensors navigation guidance control manoeuvre_settings manoeuvres scenario distributions sampling netcdf
     log dock_frame recorder trial environment metrics manoeuvre_metrics drawing plots manoeuvre_plots video export
     identification campaign reproduce cli
@@ -23,6 +23,7 @@ MAY_IMPORT_ESTIMATORS = (
     "metrics",
     "plots",
     "identification",
+    "campaign",
     "reproduce",
 )
 MODULES = sorted(path for package in ("auvsim", "estimators") for path in (ROOT / package).rglob("*.py"))

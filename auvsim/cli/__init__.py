@@ -124,8 +124,50 @@ class Reproduce:
     """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Campaign:
+    """Runs the trials of a plan on all cores or on a Dask cluster; goes on where it stopped.
+
+    Writes table.parquet, table.csv and report.html beside a file for each trial. The same plan gives the same table on
+    however many cores. Nothing that is finished is lost, however the run ends: the same command goes on.
+    """
+
+    plan: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PLAN.yaml|NAME|FOLDER")]
+    """The plan, the name of a shipped one (estimators), or the folder of a campaign."""
+    out: Path | None = None
+    """Folder of the campaign; by default out/ and the plan's name."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+    engine: Literal["local", "dask"] = "local"
+    """What runs them: processes of this machine, or Dask (pip install 'auvsim[cluster]')."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Scheduler of a Dask cluster; by default Dask starts one on this machine."""
+    trial: int | None = None
+    """Run only this trial, as `auvsim dock` does, into replays/ of the folder, or --out."""
+    variant: str | None = None
+    """Variant of that trial."""
+    video: bool = True
+    """Whether to draw docking.mp4 of that trial."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Report:
+    """Writes the tables and the report of a campaign again, also of one that is not finished."""
+
+    folder: Annotated[Path, tyro.conf.Positional]
+    """Folder of the campaign."""
+
+
 Command = (
-    Dock | Manoeuvre | Video | Plot | Metrics | Reproduce | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
+    Dock
+    | Campaign
+    | Report
+    | Manoeuvre
+    | Video
+    | Plot
+    | Metrics
+    | Reproduce
+    | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
 TAKE_SCENARIO_KEYS = {"dock": Dock, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 
@@ -169,6 +211,20 @@ def _run(arguments: list[str]) -> int:
         if scenario.manoeuvre is not None:
             raise InputError(f"the scenario is a manoeuvre; run it with `auvsim manoeuvre {scenario.manoeuvre.kind}`")
         return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+
+    if isinstance(command, Campaign | Report):
+        from auvsim.cli import campaign
+
+        match command:
+            case Report():
+                return campaign.report(command.folder)
+            case Campaign(trial=None):
+                if command.variant is not None:
+                    raise InputError("command line: --variant goes with --trial")
+                engine = {"engine": command.engine, "scheduler": command.scheduler}
+                return campaign.run(command.plan, out=command.out, jobs=command.jobs, **engine)
+        which = {"trial": command.trial, "variant": command.variant}
+        return campaign.replay(command.plan, **which, out=command.out, video=command.video)
 
     if isinstance(command, Manoeuvre):
         from auvsim.cli import manoeuvre

@@ -13,6 +13,7 @@ from auvsim.scenario import Scenario
 
 PRODUCTS = ("summary.json", "track.png", "estimates.png", "docking.mp4")  # made from trial.nc
 
+COMPILING = "compiling {} (this once; later runs find the code in the cache)"
 WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 
 
@@ -77,7 +78,7 @@ def simulate(scenario: Scenario, seed: int, trial: int, name: str = "docking") -
 
     if not fluid.is_warm():
         # A short trial calls, and so compiles, all that a long one does.
-        with report.waiting("compiling hydrodynamics and estimator (this once; later runs find them in the cache)"):
+        with report.waiting(COMPILING.format("hydrodynamics and estimator")):
             short = scenario.model_copy(update={"duration": min(scenario.duration, WARM_UP)})
             if run_trial(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
                 raise KeyboardInterrupt

@@ -89,8 +89,7 @@ def _designed(plan: Scenario, settings: OptimalSettings, seed: int) -> Scenario:
     """The plan with the manoeuvre designed on the model condensed at its speed; prints what to expect of it."""
     from auvsim import library
     from auvsim.condense import condense
-    from auvsim.identification import excitation
-    from auvsim.identification.information import Experiment
+    from auvsim.identification import excitation, information
 
     model = condense(plan.vehicle.model, settings.speed, plan.world.water_density)
     vehicle = library.vehicle(plan.vehicle.model)
@@ -98,10 +97,13 @@ def _designed(plan: Scenario, settings: OptimalSettings, seed: int) -> Scenario:
         text = f"the shaft of '{vehicle.name}' cannot hold {settings.fastest:g} m/s"
         raise InputError(f"manoeuvre optimal: {text}")
     bench = excitation.Bench(
-        experiment=Experiment(model.parameters, plan.sensors),
+        experiment=information.Experiment(model.parameters, plan.sensors),
         shaft_speed=model.shaft_speed_for,
         rudder_limit=vehicle.allocation.limit,
     )
+    if not information.is_warm():
+        with report.waiting(dock.COMPILING.format("information")):
+            bench.approach(settings)
     with report.DesignProgress() as progress:
         found = excitation.design(settings, bench, seed=seed, progress=progress)
     standards = {

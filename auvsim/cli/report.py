@@ -1,6 +1,7 @@
 """What a command shows while it works and when it is done."""
 
 import math
+import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -15,6 +16,8 @@ from auvsim.manoeuvre_metrics import LABELS, Figures
 if TYPE_CHECKING:
     from auvsim.identification.excitation import Outcome
 
+WIDTH = 140  # of the widest table [columns]
+LINE_PERIOD = 30.0  # the same of lines, where there is no bar [s]
 PERIOD = 0.1  # wall-clock time between two updates of a bar [s]; more often would slow the trial
 
 
@@ -91,6 +94,41 @@ class DesignProgress(_Bar):
         self._show(done, total, f"{done / total:4.0%}")
 
 
+class CampaignState(Protocol):
+    """What a running campaign says of itself."""
+
+    done: int
+    total: int  # at most
+    docked: int
+    errors: int
+    rate: float  # trials a second
+    remaining: float  # [s]
+
+
+class CampaignProgress(_Bar):
+    """Bar of a campaign; where there is no terminal, a line now and then."""
+
+    def __init__(self, name: str) -> None:
+        super().__init__(name)
+        self._line = 0.0
+
+    def __call__(self, state: CampaignState) -> None:
+        failed = state.done - state.docked
+        text = f"{state.done}/{state.total} done  {failed} failed"
+        text += f" ({state.errors} by errors)" if state.errors else ""
+        text += f"  {state.rate:.2f} a second  {_duration(state.remaining)} to go"
+        self._show(state.done, state.total, text)
+        if self._progress.disable and (time.monotonic() >= self._line or state.done == state.total):
+            self._line = time.monotonic() + LINE_PERIOD
+            print(f"auvsim: {text}", file=sys.stderr, flush=True)
+
+
+def _duration(seconds: float) -> str:
+    minutes, seconds = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{seconds:02d}"
+
+
 @contextmanager
 def waiting(text: str) -> Iterator[None]:
     """Says what takes long; always, since nothing else shows that the program is alive."""
@@ -153,7 +191,8 @@ def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", ro
     table.add_row("log det of the information", *(_text(found.log_det) for found in outcomes.values()))
     table.add_row("information a parameter, of the best [-]", *map(_text, efficiencies))
     table.add_row(f"room taken, {room:g} allowed [m]", *(_text(found.reach) for found in outcomes.values()))
-    Console(markup=False).print(table)
+    # A narrow terminal breaks lines, where rich would break numbers.
+    Console(markup=False, width=max(WIDTH, Console().width)).print(table)
 
 
 def _text(value: Any) -> str:

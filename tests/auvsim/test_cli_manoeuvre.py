@@ -38,6 +38,22 @@ def test_several_manoeuvres_in_one_call(tmp_path: Path, capsys: pytest.CaptureFi
     assert summary["manoeuvres"][0]["first_overshoot_deg"] > 0.0
 
 
+def test_an_optimal_manoeuvre_is_designed_and_run(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    """A table of what it and the standard manoeuvres tell, then the trial, which on MuJoCo too stays in its room."""
+    arguments = ("--manoeuvre.duration", 45, "--manoeuvre.approach", 10, "--manoeuvre.room", 60, "--seed", 4)
+    assert manoeuvre(tmp_path, "optimal", *arguments) == 0
+    assert files(tmp_path) == {"optimal.nc", "optimal.png"}
+    table = capsys.readouterr().out
+    assert all(text in table for text in ("log det", "N_uv", "largest rudder [deg]"))
+    trial = log.read(tmp_path / "optimal.nc")
+    (figures,) = manoeuvre_metrics.figures(trial)
+    assert figures.kind == "optimal"
+    room = figures.numbers["room"]
+    assert room is not None
+    assert room < 63.0  # the planar model's turns are some per cent off
+    assert trial["event"]["text"].tolist() == ["optimal: approach", "optimal"]
+
+
 def test_a_file_pins_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Keys of the same manoeuvre hold, one of another kind is left aside; options come last."""
     from auvsim.cli import manoeuvre as command
@@ -62,6 +78,10 @@ def test_a_file_pins_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         ("multisine --manoeuvre.highest 6", "highest 6 Hz must be below half the control rate, 5 Hz"),
         ("zigzag --manoeuvre.duration 0", "manoeuvre.duration: 0 should be greater than 0"),
         ("zigzig", "no manoeuvre 'zigzig'; there are circle, "),
+        ("zigzag optimal --manoeuvre.speed 3", "speed is 3 m/s, it must be from 1 to 1.8 m/s"),
+        ("optimal --manoeuvre.rudder_deg 20", "manoeuvre optimal: rudder 20 deg is beyond the fins' 15 deg"),
+        ("optimal --manoeuvre.fastest 4", "the shaft of 'remus100' cannot hold 4 m/s"),
+        ("optimal --manoeuvre.room 3 --manoeuvre.duration 30", "nothing was found that stays within a room of 3 m"),
         ("zigzag zigzag", "zigzag is given more than once"),
         ("circle --manoeuvre.speed 5", "the shaft of 'remus100' cannot hold 5 m/s"),
         ("zigzag --manoeuvre.kind prbs", "--manoeuvre.kind prbs contradicts the manoeuvre zigzag"),

@@ -7,7 +7,7 @@ import pytest
 
 from estimators import loops
 from estimators.consistency import chi_square
-from estimators.ekf import correct, correct_linear, predict
+from estimators.ekf import correct, correct_angle, correct_linear, predict
 from estimators.errors import NotFiniteError, NotPositiveDefiniteError
 from estimators.planar_filter import HeadingModel, PositionModel
 from estimators.planar_model import PRESTERO, PlanarProcess
@@ -117,6 +117,17 @@ def test_heading_innovation_is_the_short_way_round():
     assert innovation.residual[0] == pytest.approx(2 * math.pi - 6.2)
 
 
+@pytest.mark.parametrize("heading", [HeadingModel(), HeadingModel(8, bias=6)], ids=["plain", "biased"])
+def test_an_angle_at_once_is_the_angle_by_the_long_way(heading):
+    before = belief(10)
+    for value in (-3.1, 0.0, 3.1):
+        sample = measurement(value, 0.1, "compass")
+        after = correct_angle(before, heading.jacobian(before.mean), sample.value, sample.covariance)
+        expected, _ = correct(before, sample, heading)
+        assert (after.mean == expected.mean).all()
+        assert (after.covariance == expected.covariance).all()
+
+
 @pytest.mark.parametrize("angle", [-7.0, -math.pi, -1.0, 0.0, math.pi, 3.5, 100.0])
 def test_wrap(angle):
     wrapped = loops.wrap(angle)
@@ -144,5 +155,10 @@ def test_errors_have_names():
         correct_linear(before, np.zeros((1, 8)), np.ones(1), np.zeros((1, 1)))
     with pytest.raises(NotFiniteError, match="not finite"):
         correct_linear(before, np.eye(1, 8), np.full(1, math.inf), np.eye(1))
+    with pytest.raises(NotPositiveDefiniteError, match="not positive definite"):
+        correct_angle(before, np.zeros((1, 8)), np.ones(1), np.zeros((1, 1)))
+    overflowing = Gaussian(mean=before.mean, covariance=1e308 * np.eye(8))
+    with pytest.raises(NotFiniteError, match="not finite"):
+        correct_angle(overflowing, np.eye(1, 8), np.ones(1), np.eye(1))
     with pytest.raises(NotFiniteError, match="not finite"):
         predict(belief(9, n=2), Broken(), (0.0,), 0.5)

@@ -19,8 +19,11 @@ from estimators.docking import (
     UsblFix,
 )
 from estimators.errors import NotFiniteError, ParameterError
+from estimators.history import Node
+from estimators.planar_filter import COMPASS, USBL
 from estimators.planar_model import PRESTERO
 from estimators.recovery import Rejected, agreeing
+from estimators.types import Measurement
 
 BIASES = {"surge": Bias(3e-3), "compass": Bias(0.02), "dock_heading": Bias(0.01), "clock": Bias(0.1)}
 FILTERS = {
@@ -149,10 +152,32 @@ def test_the_fast_mode_is_believed_while_the_current_turns():
 def test_wrong_modes_are_refused():
     with pytest.raises(ParameterError, match="3 modes need"):
         InteractingFilter(PRESTERO, currents=(1e-8, 1e-4, 1e-2))
-    with pytest.raises(ParameterError, match="of sum 1"):
-        InteractingFilter(PRESTERO, initial=(0.5, 0.6))
-    with pytest.raises(ParameterError, match="above 0"):
-        InteractingFilter(PRESTERO, transition=((1.0, 0.0), (0.1, 0.9)))
+    for initial in ((0.5, 0.6), (0.0, 1.0), (1.0,)):
+        with pytest.raises(ParameterError, match="2 probabilities above 0 of sum 1"):
+            InteractingFilter(PRESTERO, initial=initial)
+    for switching in (((0.0, 0.1), (-0.1, 0.0)), ((0.0, 0.1), (0.0, 0.0))):  # no rate; no way back
+        with pytest.raises(ParameterError, match="from every mode to every other"):
+            InteractingFilter(PRESTERO, switching=switching)
+
+
+@pytest.mark.parametrize("interval", [1.0, 2.0, 5.0])
+def test_modes_change_with_time_and_not_with_the_number_of_fixes(interval):
+    """Fixes that say nothing leave the probabilities of a two-state Markov chain, however often they come."""
+    away, back, duration = 0.02, 0.05, 10.0
+    docking = InteractingFilter(PRESTERO, switching=((0.0, away), (back, 0.0)), initial=(0.9, 0.1))
+
+    def fix(stamp):
+        vague = 1e12 * np.eye(2)  # its likelihoods in the modes differ by some 1e-10
+        return Measurement(kind=USBL, value=np.array([40.0, 0.0]), covariance=vague, stamp=stamp, received=stamp)
+
+    heading = Measurement(kind=COMPASS, value=np.zeros(1), covariance=np.eye(1), stamp=0.0, received=0.0)
+    state = docking.start([Node(0.0, (0.0, 0.0), [heading, fix(0.0)], is_grid=True)], 0)
+    for k in range(round(duration / interval)):
+        stamp = (k + 1) * interval
+        state = docking.correct(docking.predict(state, (0.0, 0.0), interval), stamp, [fix(stamp)])
+    share = away / (away + back)
+    expected = share + (0.1 - share) * math.exp(-(away + back) * duration)
+    assert state.weights == pytest.approx([1.0 - expected, expected], abs=1e-6)
 
 
 def rejected(stamp, north, east):

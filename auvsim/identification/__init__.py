@@ -1,0 +1,1 @@
+"""Parameters of the planar model from records of manoeuvres."""

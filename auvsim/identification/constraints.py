@@ -1,0 +1,39 @@
+"""What physics says of the planar parameters: inertia is positive, damping takes energy."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from estimators.planar_model import PlanarParameters
+from estimators.types import Array
+
+# Drag, cross-flow and lift along and about the vehicle's own axes lose energy; a propeller ahead pushes ahead, less so
+# with speed. Couplings (Y_rr, N_vv, Y_ur, N_uv) and the rudder's place may have either sign.
+SIGNS = {
+    "X_uu": -1, "X_u": -1, "X_dd": -1, "X_nn": 1, "X_nu": -1,
+    "Y_vv": -1, "Y_v": -1, "Y_uv": -1,
+    "N_rr": -1, "N_r": -1, "N_ur": -1,
+}  # fmt: skip
+
+
+def limits(free: Sequence[str], signs: bool) -> tuple[Array, Array]:
+    """Lowest and highest values (k,) of the free parameters; infinite without `signs`."""
+    side = np.array([SIGNS.get(name, 0) if signs else 0 for name in free])
+    return np.where(side > 0, 0.0, -np.inf), np.where(side < 0, 0.0, np.inf)
+
+
+def inertia(p: PlanarParameters) -> Array:
+    """The matrix (3, 3) that multiplies the accelerations of surge, sway and yaw."""
+    return np.array(
+        [
+            [p.m - p.X_ud, 0.0, 0.0],
+            [0.0, p.m - p.Y_vd, p.m * p.x_g - p.Y_rd],
+            [0.0, p.m * p.x_g - p.N_vd, p.I_z - p.N_rd],
+        ]
+    )
+
+
+def has_inertia(p: PlanarParameters) -> bool:
+    """Whether the inertia is positive: every acceleration of the vehicle costs energy."""
+    M = inertia(p)
+    return bool(np.linalg.eigvalsh(0.5 * (M + M.T))[0] > 0.0)

@@ -1,0 +1,112 @@
+"""Trial logs as signals: what the vehicle and its dock measured, never the truth."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from auvsim import library, manoeuvres, scenario
+from auvsim.allocation import Allocation
+from auvsim.errors import InputError
+from auvsim.guidance import Phase
+from auvsim.identification.signals import MARGIN, Signal, Signals, steep, stretches
+from auvsim.log import TrialLog, read
+from auvsim.metrics import fixes
+from estimators.types import Array
+
+
+def signals(path: Path) -> tuple[list[Signals], list[str], str]:
+    """The manoeuvre of a trial log as signals, notes, and the vehicle's model.
+
+    Raises:
+        InputError: It is no whole log, or has neither fins nor heading in it.
+    """
+    log = read(path)
+    name = path.name
+    plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
+    for group, what in (("feedback", "fins and shaft"), ("compass", "heading")):
+        if len(log[group]["time"]) < 2:
+            raise InputError(f"{path}: no readings of {group}; a fit needs {what}, log a trial of some minutes")
+    vehicle = library.vehicle(plan.vehicle.model)
+    feedback = log["feedback"]
+    times = feedback["time"]
+    found = {
+        "rudder": Signal(times=times, values=_rudder(vehicle.allocation, feedback["value"][:, :-1])),
+        "shaft_speed": Signal(times=times, values=feedback["value"][:, -1]),
+        "heading": Signal(times=log["compass"]["time"], values=np.unwrap(log["compass"]["value"][:, 0])),
+    }
+    if len(log["gyro"]["time"]):
+        found["yaw_rate"] = Signal(times=log["gyro"]["time"], values=log["gyro"]["value"][:, 2])
+    for column, quantity in ((0, "ground_surge"), (1, "ground_sway"), (3, "surge"), (4, "sway")):
+        values = log["dvl"]["value"][:, column]
+        there = np.isfinite(values)
+        if there.sum() > 1:
+            found[quantity] = Signal(times=log["dvl"]["time"][there], values=values[there])
+    places, where = _places(log, found["heading"], plan.sensors.usbl.transponder)
+    if len(where) > 1:
+        found |= {axis: Signal(times=where, values=places[:, k]) for k, axis in enumerate(("north", "east"))}
+    barred = _barred(log)
+    end = float(times[-1])
+    out = sum(min(stop, end) - start for start, stop in barred)
+    notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if barred else []
+    deviations = _deviations(plan, places)
+    parts = [
+        Signals(
+            name=label, kind=kind, signals=found, deviations=deviations,
+            barred=(*barred, (-math.inf, start), (stop, math.inf)),
+        )
+        for label, kind, start, stop in _parts(plan, name)
+    ]  # fmt: skip
+    return parts, notes, plan.vehicle.model
+
+
+def _parts(plan: scenario.Scenario, name: str) -> list[tuple[str, str, float, float]]:
+    """Label, kind, start and end [s] of each manoeuvre of a log."""
+    if plan.manoeuvre is None:
+        return [(name, "docking", -math.inf, math.inf)]
+    found = list(manoeuvres.parts(plan.manoeuvre))
+    if len(found) == 1:
+        return [(name, found[0].settings.kind, -math.inf, math.inf)]
+    ends = [*(part.start for part in found[1:]), math.inf]
+    return [(f"{name}, {p.settings.kind}", p.settings.kind, p.start, end) for p, end in zip(found, ends, strict=True)]
+
+
+def _rudder(allocation: Allocation, fins: Array) -> Array:
+    return np.array([allocation.effective(angles)[0] for angles in fins.tolist()])
+
+
+def _places(log: TrialLog, heading: Signal, transponder: tuple[float, float, float]) -> tuple[Array, Array]:
+    """North and east (n, 2) [m] of the body's origin by fixes that arrived, in order of their stamps (n,) [s]."""
+    arrived = np.isfinite(log["usbl"]["received"])
+    stamps, first = np.unique(log["usbl"]["time"][arrived], return_index=True)
+    places = fixes(log)[arrived][first]
+    psi = np.interp(stamps, heading.times, heading.values)
+    forward, starboard, _ = transponder
+    arm = (forward + 1j * starboard) * np.exp(1j * psi)
+    return places - np.column_stack([arm.real, arm.imag]), stamps
+
+
+def _deviations(plan: scenario.Scenario, places: Array) -> dict[str, float]:
+    """Of one reading, as the scenario's data sheets say."""
+    sensors = plan.sensors
+    distance = max(float(np.median(np.hypot(*places.T))), 1e-3) if len(places) else 1.0
+    ranges, sds = np.log(np.array(sensors.usbl.noise)).T
+    fix = sensors.usbl.noise_scale * math.exp(float(np.interp(math.log(distance), ranges, sds)))
+    given = {
+        "north": fix, "east": fix,
+        "heading": math.radians(sensors.compass.heading_noise_deg),
+        "surge": sensors.dvl.water_noise[0], "sway": sensors.dvl.water_noise[1],
+        "yaw_rate": math.radians(sensors.gyro.noise_density_deg) * math.sqrt(sensors.gyro.rate),
+        "ground_surge": sensors.dvl.bottom_noise[0], "ground_sway": sensors.dvl.bottom_noise[1],
+    }  # fmt: skip
+    return {quantity: deviation for quantity, deviation in given.items() if deviation > 0.0}
+
+
+def _barred(log: TrialLog) -> tuple[tuple[float, float], ...]:
+    """Spans in which the vehicle is steep, goes astern, or has come to the dock."""
+    compass, feedback, guidance = log["compass"], log["feedback"], log["guidance"]
+    spans = steep(Signal(times=compass["time"], values=compass["value"][:, 1]))
+    spans += stretches(feedback["time"], feedback["value"][:, -1] < 0.0)
+    ends = [guidance["time"][guidance["phase"] == Phase.DOCKED], log["contact"]["time"]]
+    first = min((float(times[0]) for times in ends if len(times)), default=math.inf)
+    return (*spans, *([(first - MARGIN, math.inf)] if math.isfinite(first) else []))

@@ -1,0 +1,69 @@
+"""Reads logs, whosever they are, into records."""
+
+import hashlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import h5py
+
+from auvsim import library
+from auvsim.errors import InputError
+from auvsim.identification import checks, log_records, signals, table_records
+from auvsim.identification.columns import ColumnSettings, read_map
+from auvsim.identification.records import Readings
+from auvsim.planar_sets import Source
+
+
+def read(
+    paths: Sequence[Path], *, vehicle: str | None = None, columns: Path | None = None, step: float | None = None
+) -> Readings:
+    """Reads trial logs and users' tables into records.
+
+    Args:
+        paths: NetCDF logs of auvsim, or CSV and NetCDF files with named columns.
+        vehicle: Name in models/, or the path of an MJCF file; a trial log's must be the same. Its limits are known.
+        columns: A mapping file for the users' tables.
+        step: Of the records' grid [s]; each rudder's own if None.
+
+    Raises:
+        InputError: One line with the file and what is wrong in it, and what would be right.
+    """
+    mapping = {} if columns is None else read_map(columns)
+    limits = library.vehicle(vehicle or "remus100")
+    found, notes, sources = [], [], []
+    for path in paths:
+        sources.append(Source(file=path.name, sha256=_hash(path)))
+        ones, more = _signals(path, mapping, vehicle)
+        checks.signals(ones, limits.allocation.limit, limits.shaft_limit)
+        notes += more
+        for one in ones:
+            records, more = signals.records(one, step)
+            found += records
+            notes += more
+    return Readings(records=tuple(found), sources=tuple(sources), notes=tuple(notes))
+
+
+def _signals(
+    path: Path, mapping: dict[str, ColumnSettings], vehicle: str | None
+) -> tuple[list[signals.Signals], list[str]]:
+    if not _is_trial_log(path):
+        return table_records.signals(path, mapping)
+    found, notes, model = log_records.signals(path)
+    if vehicle is not None and model != vehicle:
+        raise InputError(f"{path}: a log of '{model}', not of '{vehicle}'; give --vehicle {model}")
+    return found, notes
+
+
+def _is_trial_log(path: Path) -> bool:
+    try:
+        with h5py.File(path, "r") as file:
+            return "format_version" in file.attrs and "scenario" in file.attrs
+    except OSError:
+        return False
+
+
+def _hash(path: Path) -> str:
+    try:
+        return hashlib.sha256(path.read_bytes()).hexdigest()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None

@@ -1,0 +1,216 @@
+"""A user's CSV or NetCDF file as signals: several rates, gaps, rows of NaN, several manoeuvres."""
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from auvsim.errors import InputError
+from auvsim.identification import checks
+from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, understand
+from auvsim.identification.records import MEASURED
+from auvsim.identification.signals import Signal, Signals, noise, steep
+from auvsim.identification.table_files import Column, load
+from estimators.types import Array
+
+EARTH = 6_371_000.0  # mean radius [m]
+_NEEDED = ("time", "rudder", "shaft_speed")
+_EXAMPLES = {"time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]"}
+
+
+class _Piece(NamedTuple):
+    """Rows of one manoeuvre in the columns as long as the time."""
+
+    rows: slice
+    start: float
+    stop: float
+    kind: str
+
+
+class _Table(NamedTuple):
+    """A file's columns and what they mean."""
+
+    path: Path
+    columns: Mapping[str, Column]
+    meanings: Mapping[str, Meaning]  # by quantity
+    constants: Mapping[str, float]  # by quantity [SI]
+    time: Array  # of the rows [s]
+
+
+def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Signals], list[str]]:
+    """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
+
+    Raises:
+        InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
+    """
+    columns = load(path)
+    headers = {name: column.unit for name, column in columns.items()}
+    meanings, unknown = understand(headers, mapping, str(path))
+    by_quantity = {meaning.quantity: meaning for meaning in meanings}
+    constants = {
+        name: s.constant * s.sign * (factor(s.unit, name, str(path)) if s.unit else 1.0)
+        for name, s in mapping.items()
+        if s.constant is not None
+    }
+    _require(path, by_quantity.keys() | constants.keys(), list(columns))
+    for quantity, meaning in by_quantity.items():
+        checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
+    time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
+    table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time))
+    notes = list(_assumptions(table, unknown))
+    found = []
+    pieces = list(_pieces(table))
+    for number, piece in enumerate(pieces, start=1):
+        label = path.name if len(pieces) == 1 else f"{path.name}, {piece.kind or f'part {number}'}"
+        one, more = _signals(table, piece, label)
+        found += [one] if one is not None else []
+        notes += more
+    return found, notes
+
+
+def _require(path: Path, there: set[str], columns: Sequence[str]) -> None:
+    there = there | ({"rudder"} if "rudder_command" in there else set())
+    for quantity in _NEEDED:
+        if quantity not in there:
+            raise InputError(
+                f"{path}: no column is the {quantity.replace('_', ' ')}; there are {', '.join(columns)}; "
+                f"name one `{_EXAMPLES[quantity]}` or say which with --columns"
+            )
+    if not {"heading", "yaw_rate"} & there:
+        raise InputError(f"{path}: neither heading nor yaw rate is there; name a column `heading [deg]` or `r [deg/s]`")
+
+
+def _assumptions(table: _Table, unknown: Sequence[str]) -> Iterator[str]:
+    name = table.path.name
+    assumed = [f"{m.column} in {m.assumed}" for m in table.meanings.values() if m.assumed]
+    if assumed:
+        yield f"{name}: no unit given, taken as SI: {', '.join(assumed)}"
+    if unknown:
+        yield f"{name}: columns not used: {', '.join(unknown)}"
+    for quantity, meaning in table.meanings.items():
+        column = table.columns[meaning.column]
+        if column.texts is not None and quantity != "manoeuvre":
+            words = sum(bool(cell) for cell in column.texts[np.isnan(column.values)])
+            yield f"{name}: {words} cells of '{meaning.column}' are no numbers, taken as missing"
+    if "rudder" not in table.meanings and "rudder_command" in table.meanings:
+        yield f"{name}: only the rudder's command is there: the lag of its servo counts as the vehicle's"
+
+
+def _pieces(table: _Table) -> Iterator[_Piece]:
+    """Rows of each manoeuvre: a column may name them, and a clock that starts again begins another."""
+    time = table.time
+    known = np.flatnonzero(np.isfinite(time))
+    starts = {0}
+    first = float(time[known[0]])
+    for before, after in pairwise(known.tolist()):
+        if time[after] < time[before]:
+            if time[after] > first + 1.0:
+                raise InputError(
+                    f"{table.path}: row {after + 1}: time goes back from {time[before]:g} to {time[after]:g} s; "
+                    "sort the rows by time, or give the right column with --columns"
+                )
+            starts.add(after)
+            first = float(time[after])
+    kinds = np.full(len(time), "", dtype=object)
+    if "manoeuvre" in table.meanings:
+        column = table.columns[table.meanings["manoeuvre"].column]
+        kinds = column.texts if column.texts is not None else np.array([f"{v:g}" for v in column.values], dtype=object)
+        starts |= {k for k in range(1, len(kinds)) if kinds[k] != kinds[k - 1]}
+    edges = [*sorted(starts), len(time)]
+    for start, stop in pairwise(edges):
+        inside = time[start:stop][np.isfinite(time[start:stop])]
+        if len(inside) > 1:
+            kind = str(kinds[start]).strip()
+            yield _Piece(slice(start, stop), float(inside.min()), float(inside.max()), kind)
+
+
+def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, list[str]]:
+    found: dict[str, Signal] = {}
+    deviations: dict[str, float] = {}
+    notes: list[str] = []
+    for quantity, meaning in table.meanings.items():
+        if QUANTITIES[quantity].kind in ("time", "text"):
+            continue
+        times, values, missing, repeated = _samples(table, piece, meaning)
+        if missing or repeated:
+            parts = [f"{missing} missing"] * bool(missing) + [f"{repeated} with repeated stamps dropped"] * bool(
+                repeated
+            )
+            notes.append(f"{label}: {meaning.column}: of {len(values) + missing + repeated} samples {', '.join(parts)}")
+        if len(times) < 2:
+            continue
+        if quantity == "heading":
+            checks.heading_unit(times, values, meaning, table.path)
+            values = np.unwrap(values)
+        found[quantity] = Signal(times=times, values=values, held=quantity == "rudder_command")
+        if meaning.deviation is not None:
+            deviations[quantity] = meaning.deviation
+    for quantity, value in table.constants.items():
+        ends = np.array([piece.start, 0.5 * (piece.start + piece.stop), piece.stop])
+        found[quantity] = Signal(times=ends, values=np.full(3, value))
+    _combine(found)
+    lacking = [quantity for quantity in ("rudder", "shaft_speed") if quantity not in found]
+    if lacking:
+        return None, [*notes, f"{label}: left out: no {' and no '.join(lacking)} in it"]
+    for quantity in set(MEASURED) & found.keys() - {"north", "east"}:
+        deviations.setdefault(quantity, noise(found[quantity], quantity))
+    result = Signals(
+        name=label, kind=piece.kind, signals=found, deviations=deviations, current=_current(found),
+        barred=tuple(steep(found["pitch"])) if "pitch" in found else (),
+    )  # fmt: skip
+    return result, notes
+
+
+def _samples(table: _Table, piece: _Piece, meaning: Meaning) -> tuple[Array, Array, int, int]:
+    """Stamps and values [SI] of a column in a manoeuvre; how many are missing, and how many stamps repeated."""
+    column = table.columns[meaning.column]
+    values, time = column.values * meaning.factor, table.time
+    own = meaning.time or (column.time if column.time in table.columns else None)
+    if own is not None and own != table.meanings["time"].column:
+        origin = table.columns[table.meanings["time"].column].values * table.meanings["time"].factor
+        scale = table.meanings["time"].factor
+        time = table.columns[own].values * scale - np.nanmin(origin)
+        chosen = (time >= piece.start) & (time <= piece.stop)
+        time, values = time[chosen], values[chosen]
+    elif len(values) == len(time):
+        time, values = time[piece.rows], values[piece.rows]
+    else:
+        raise InputError(
+            f"{table.path}: '{meaning.column}' has {len(values)} values, the time {len(time)}, and none of its own"
+        )
+    there = np.isfinite(values) & np.isfinite(time)
+    # Rows of NaN between samples of a slower sensor are none that are missing.
+    count, missing = int(there.sum()), 0
+    if count > 1:
+        usual = float(np.median(np.diff(np.flatnonzero(there))))
+        missing = max(0, round((np.flatnonzero(there)[-1] - np.flatnonzero(there)[0]) / usual) + 1 - count)
+    time, values = time[there], values[there]
+    if (np.diff(time) < 0.0).any():
+        k = int(np.flatnonzero(np.diff(time) < 0.0)[0])
+        raise InputError(
+            f"{table.path}: '{own or meaning.column}': time goes back from {time[k]:g} to {time[k + 1]:g} s; sort it"
+        )
+    new = np.concatenate([[True], np.diff(time) > 0.0])[: len(time)]
+    return time[new], values[new], missing, int(len(time) - new.sum())
+
+
+def _combine(found: dict[str, Signal]) -> None:
+    """Puts what goes by other names under those of a record."""
+    if "rudder" not in found and "rudder_command" in found:
+        found["rudder"] = found["rudder_command"]
+    if {"latitude", "longitude"} <= found.keys() and "north" not in found:
+        lat, lon = found["latitude"], found["longitude"]
+        reach = math.radians(1.0) * EARTH
+        across = np.interp(lat.times, lon.times, lon.values) - lon.values[0]
+        found["north"] = Signal(times=lat.times, values=reach * (lat.values - lat.values[0]))
+        narrowing = math.cos(math.radians(float(lat.values[0])))
+        found["east"] = Signal(times=lat.times, values=reach * narrowing * across)
+
+
+def _current(found: Mapping[str, Signal]) -> Array | None:
+    if not {"current_north", "current_east"} <= found.keys():
+        return None
+    return np.array([found[f"current_{axis}"].values.mean() for axis in ("north", "east")])

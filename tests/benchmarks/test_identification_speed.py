@@ -1,0 +1,156 @@
+"""Time of fits, beside SciPy's least squares and mujoco.sysid on the same data in the same run.
+
+Run with `pytest tests/benchmarks/test_identification_speed.py --benchmark-enable`; times are printed, not judged.
+mujoco.sysid (`pip install mujoco[sysid]`) identifies parameters of MuJoCo's own models. It has no planar model and no
+parameter of hydrodynamics with added mass; it can be given a rollout of one's own. It is handed the compiled planar
+model here, whole records from known first states, and its own finite differences, optimiser and residuals.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from auvsim.identification import compiled
+from auvsim.identification.fit import DEFAULT_FREE, NO_NUISANCES, with_values
+from auvsim.identification.least_squares import fit_least_squares
+from auvsim.identification.prediction_error import PredictionErrorOptions, fit_prediction_error
+from auvsim.identification.segments import Problem, SegmentOptions, fit_segments
+from auvsim.identification.simulated import SHEETS, Vessel, simulate
+from auvsim.identification.states import smoothed
+from estimators.planar_model import PARAMETER_NAMES, PlanarParameters, PlanarProcess
+
+# The REMUS-100 condensed at 1 m/s, rounded.
+PARAMETERS = PlanarParameters(
+    m=31.03, I_z=4.031, X_ud=-0.839, Y_vd=-29.44, N_rd=-3.426, X_uu=-6.1, X_vr=29.44, X_dd=-0.1,
+    X_nn=4.1e-3, X_nu=-0.159, Y_uv=-53.6, Y_ur=15.8, Y_dd=-3.41, Y_vv=-220.0, Y_rr=17.4,
+    N_uv=-7.49, N_ur=-11.2, N_dd=2.51, N_vv=41.9, N_rr=-27.3,
+)  # fmt: skip
+VESSEL = Vessel(parameters=PARAMETERS)
+TRUTH = np.array([getattr(PARAMETERS, name) for name in DEFAULT_FREE])
+START = with_values(PARAMETERS, DEFAULT_FREE, TRUTH * np.random.default_rng(0).uniform(0.7, 1.3, len(TRUTH)))
+OPTIONS = SegmentOptions(nuisances=SHEETS)
+SHORT = ("X_uu", "Y_uv", "N_ur", "N_dd")  # what the others are asked for, in time that one can wait
+INDICES = [PARAMETER_NAMES.index(name) for name in SHORT]
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _compile():
+    fit_segments([simulate(VESSEL, "multisine", 0, 20.0).record], START, DEFAULT_FREE, OPTIONS)
+
+
+def record(duration):
+    return simulate(VESSEL, "multisine", 1, duration).record
+
+
+@pytest.mark.parametrize("duration", [300.0, 3000.0])
+def test_fit_of_segments(benchmark, duration):
+    """The whole fit of 14 parameters, current and biases, from a start wrong by up to 30 %."""
+    data = record(duration)
+    fit = benchmark.pedantic(fit_segments, ([data], START, DEFAULT_FREE, OPTIONS), rounds=5)
+    benchmark.extra_info["iterations"] = fit.iterations
+    assert fit.converged
+
+
+@pytest.mark.parametrize("duration", [300.0, 3000.0])
+def test_one_step_of_segments(benchmark, duration):
+    """Sensitivities, normal equations, elimination and step: one iteration of the fit."""
+    data = record(duration)
+    problem = Problem([data], START, DEFAULT_FREE, OPTIONS, 5.0, [smoothed(data, START, SHEETS.vector())])
+    values, firsts = START.vector()[problem.indices], [cut.held for cut in problem.cuts]
+
+    def step():
+        H, g, _ = problem.reduced(problem.at(values, problem.nuisances, firsts), 1e-6)
+        return np.linalg.solve(H, g)
+
+    assert np.isfinite(benchmark(step)).all()
+
+
+def test_least_squares(benchmark):
+    data = record(300.0)
+    assert benchmark(fit_least_squares, [data], START).improved
+
+
+def test_prediction_error(benchmark):
+    data = record(300.0)
+    rough = fit_segments([data], START, DEFAULT_FREE, OPTIONS).parameters
+    options = PredictionErrorOptions(nuisances=SHEETS)
+    fit = benchmark.pedantic(fit_prediction_error, ([data], rough, DEFAULT_FREE, options), rounds=1)
+    assert math.isfinite(fit.cost)
+
+
+def whole_record():
+    """A record without constant errors from a known first state, its inputs, and the residuals of a rollout."""
+    run = simulate(Vessel(parameters=PARAMETERS, errors=NO_NUISANCES), "multisine", 2, 300.0)
+    process, kicks = PlanarProcess(PARAMETERS, np.zeros(8)), np.zeros((len(run.record.times) - 1, 8))
+    first, there = run.states[0], np.isfinite(run.record.measured[:, 2:6])
+
+    def rollout(values):
+        process._p[INDICES] = values  # the compiled walk with other parameters
+        return process.walk(first, run.record.inputs[:-1], run.record.step, kicks)
+
+    def residuals(values):
+        shown = rollout(values)[:, 2:6]
+        return ((shown - run.record.measured[:, 2:6]) / run.record.deviations[2:6])[there]
+
+    return run, rollout, residuals
+
+
+def near():
+    """A start for four parameters wrong by 10 %: whole records run away from one that is much worse."""
+    return np.array([getattr(PARAMETERS, name) for name in SHORT]) * (1.1, 0.9, 1.1, 0.9)
+
+
+def test_four_parameters_here(benchmark):
+    run, _, _ = whole_record()
+    options = SegmentOptions(nuisances=NO_NUISANCES, length=math.inf, schedule=())
+    fit = benchmark(fit_segments, [run.record], with_values(PARAMETERS, SHORT, near()), SHORT, options)
+    assert fit.converged
+
+
+def test_four_parameters_in_scipy(benchmark):
+    """Finite differences over the same compiled model, one segment, first state known."""
+    _, _, residuals = whole_record()
+    found = benchmark.pedantic(least_squares, (residuals, near()), {"x_scale": np.abs(near())}, rounds=3)
+    assert found.x / near() == pytest.approx(1.0, abs=0.15)
+
+
+def test_fourteen_parameters_and_segments_in_scipy(benchmark):
+    """60 s of what `test_fit_of_segments` does for 300 s: first states are unknowns, and differences dense."""
+    data = record(60.0)
+    states = [smoothed(data, START, SHEETS.vector())]
+    problem = Problem([data], START, DEFAULT_FREE, OPTIONS, 5.0, states)
+    k, count = len(DEFAULT_FREE), len(problem.cuts[0].held)
+    loops, there = compiled.segments(), np.isfinite(data.measured)
+    assert loops is compiled.segments()
+
+    def residuals(w):
+        point = problem.at(w[:k], w[None, k : k + 6], [np.ascontiguousarray(w[k + 6 :].reshape(count, 6))])
+        return np.concatenate([point.residuals[0][there], w[k : k + 6] / SHEETS.vector()])
+
+    first = np.concatenate([START.vector()[problem.indices], np.zeros(6), problem.cuts[0].held.ravel()])
+    found = benchmark.pedantic(least_squares, (residuals, first), {"x_scale": "jac", "max_nfev": 20}, rounds=1)
+    assert np.isfinite(found.cost)
+
+
+def test_four_parameters_in_mujoco_sysid(benchmark):
+    """Its optimiser on the same residuals, by its own finite differences; it is given them as a function."""
+    sysid = pytest.importorskip("mujoco.sysid")
+    if not hasattr(sysid, "optimize"):
+        pytest.skip("mujoco.sysid has not its dependencies; pip install mujoco[sysid]")
+    _, _, residuals = whole_record()
+    parameters = sysid.ParameterDict(
+        {
+            name: sysid.Parameter(
+                name, value, min_value=min(0.2 * value, 5.0 * value), max_value=max(0.2 * value, 5.0 * value)
+            )
+            for name, value in zip(SHORT, near().tolist(), strict=True)
+        }
+    )
+
+    def function(x, _):
+        columns = np.atleast_2d(x.T).reshape(-1, len(SHORT)) if x.ndim == 2 else x[None]
+        return [np.stack([residuals(column) for column in columns], axis=-1)], [], []
+
+    benchmark.pedantic(sysid.optimize, (parameters, function), {"verbose": False}, rounds=3)
