@@ -119,7 +119,15 @@ class World:
         self._slot = hydrodynamics.equip(model, water_density)[f"{vehicle.name}/"]
         self._floor = -float(model.geom("sea_floor").pos[2])
         joint = model.joint(f"{vehicle.name}/")
-        self._q, self._v = int(joint.qposadr[0]), int(joint.dofadr[0])
+        q, v = int(joint.qposadr[0]), int(joint.dofadr[0])
+        # Views of MuJoCo's arrays, which stay where they are: to ask MjData for one costs as much as a calculation.
+        self._qpos, self._qvel, self._control, self._options = data.qpos, data.qvel, data.ctrl, model.opt
+        self._position, self._quaternion, self._velocity = (
+            data.qpos[q : q + 3],
+            data.qpos[q + 3 : q + 7],
+            data.qvel[v : v + 6],
+        )
+        self._water = data.userdata[self._slot : self._slot + WATER]
         fins = [model.actuator(f"{vehicle.name}/{fin}") for fin in vehicle.allocation.names]
         shaft = model.actuator(f"{vehicle.name}/shaft")
         self._fin_controls = [int(fin.id) for fin in fins]
@@ -128,7 +136,9 @@ class World:
         self._captured = int(model.sensor("captured").adr[0])
         self._latch = int(model.equality("latch").id)
         self._force, self._rotation = np.zeros(6), np.zeros(9)
-        self._flags = int(model.opt.disableflags)
+        self._matrix = self._rotation.reshape(3, 3)
+        self._near_flags = int(model.opt.disableflags)
+        self._far_flags = self._near_flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
         self.contacts: list[Contact] = []
 
     @classmethod
@@ -173,14 +183,13 @@ class World:
             )
         mujoco.mj_resetData(self.model, self.data)
         self.contacts.clear()
-        q, v = self._q, self._v
         water = self._current.evaluate(0.0, np.asarray(position, dtype=float)).velocity
         ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
-        self.data.qpos[q : q + 3] = flip(position)
-        self.data.qpos[q + 3 : q + 7] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
-        self.data.qvel[v : v + 3] = flip(speed * ahead + water)
-        self.data.qvel[self._shaft_v] = shaft_speed
-        self.data.ctrl[self._shaft_control] = shaft_speed
+        self._position[:] = flip(position)
+        self._quaternion[:] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
+        self._velocity[:3] = flip(speed * ahead + water)
+        self._qvel[self._shaft_v] = shaft_speed
+        self._control[self._shaft_control] = shaft_speed
         self.refresh_water()
         mujoco.mj_forward(self.model, self.data)
 
@@ -191,9 +200,9 @@ class World:
             ahead: how far from now the expansion is taken [s]; half the time for which it will serve makes its error
                 second order in that time.
         """
-        position, time = self.data.qpos[self._q : self._q + 3], self.data.time + ahead
+        position, time = self._position, self.data.time + ahead
         water = self._current.evaluate(time, flip(position))
-        slot = self.data.userdata[self._slot : self._slot + WATER]
+        slot = self._water
         slot[0] = time
         slot[1:4] = position
         slot[4:7] = flip(water.velocity)
@@ -202,7 +211,7 @@ class World:
 
     def command(self, rudder: float, elevator: float, shaft_speed: float) -> None:
         """Sets effective rudder and elevator [rad] and shaft speed [rad/s]; servos and shaft follow with their lags."""
-        control = self.data.ctrl
+        control = self._control
         for index, angle in zip(self._fin_controls, self.vehicle.allocation.fins(rudder, elevator), strict=True):
             control[index] = angle
         control[self._shaft_control] = shaft_speed
@@ -216,24 +225,24 @@ class World:
             DivergenceError: the state is no longer finite and physical.
         """
         if not self._current.steady_uniform:
-            self.refresh_water(0.5 * ticks * self.model.opt.timestep)
-        x, y, z = self.data.qpos[self._q : self._q + 3].tolist()
+            self.refresh_water(0.5 * ticks * self._options.timestep)
+        x, y, z = self._position.tolist()
         near = x * x + y * y + (z + self.pose.depth) ** 2 < NEAR**2 or z < 2.0 - self._floor
         # Far from everything the search for contacts would find none, and costs a third of a step.
-        self.model.opt.disableflags = self._flags if near else self._flags | mujoco.mjtDisableBit.mjDSBL_CONTACT
+        self._options.disableflags = self._near_flags if near else self._far_flags
         if near:
             for _ in range(ticks):
                 self._step(1)
                 self._watch()
         else:
             self._step(ticks)
-        energy = float(self.data.qvel @ self.data.qvel)
+        energy = float(self._qvel @ self._qvel)
         if not energy < 1e6:
             raise DivergenceError(self._diagnosis())
 
     def _step(self, ticks: int) -> None:
         mujoco.mj_step(self.model, self.data, ticks)
-        step = self.model.opt.timestep
+        step = self._options.timestep
         self.data.time = round(self.data.time / step) * step  # MuJoCo adds steps up, and with them their rounding
 
     def _watch(self) -> None:
@@ -262,20 +271,20 @@ class World:
 
     def truth(self) -> Truth:
         """The true state now, in NED and forward-starboard-down."""
-        data, q, v = self.data, self._q, self._v
-        position = data.qpos[q : q + 3] * FLIP
-        quaternion = flip_quaternion(data.qpos[q + 3 : q + 7])
+        time = self.data.time
+        position = self._position * FLIP
+        quaternion = flip_quaternion(self._quaternion)
         mujoco.mju_quat2Mat(self._rotation, quaternion)
         r00, _, _, r10, _, _, r20, r21, r22 = self._rotation.tolist()
-        nu = data.qvel[v : v + 6] * FLIP6
-        nu[:3] = nu[:3] @ self._rotation.reshape(3, 3)
+        nu = self._velocity * FLIP6
+        nu[:3] = nu[:3] @ self._matrix
         return Truth(
-            time=data.time,
+            time=time,
             position=position,
             quaternion=quaternion,
             attitude=np.array((math.atan2(r21, r22), -math.asin(max(-1.0, min(1.0, r20))), math.atan2(r10, r00))),
             nu=nu,
-            current=self._current.evaluate(data.time, position).velocity,
-            fins=data.qpos[self._fin_q],
-            shaft_speed=float(data.qvel[self._shaft_v]),
+            current=self._current.evaluate(time, position).velocity,
+            fins=self._qpos[self._fin_q],
+            shaft_speed=float(self._qvel[self._shaft_v]),
         )

@@ -48,3 +48,18 @@ def test_the_printed_log_format_is_the_log_format():
     from auvsim.log import table_markdown
 
     assert (ROOT / "docs" / "log_format.md").read_text() == table_markdown() + "\n"
+
+
+def test_the_printed_columns_of_a_campaign_are_its_columns():
+    from auvsim.campaign.table import markdown
+
+    assert (ROOT / "docs" / "campaign_table.md").read_text() == markdown() + "\n"
+
+
+def test_the_plan_in_the_documentation_is_a_plan():
+    from auvsim.campaign import plan
+
+    text = (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1].split("```")[0]
+    found = plan.parse(yaml.safe_load(text))
+    assert len(found.cells) == 3
+    assert found.variants == ("ekf", "imm")

@@ -133,7 +133,7 @@ class Campaign:
     """
 
     plan: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PLAN.yaml|NAME|FOLDER")]
-    """The plan, the name of a shipped one (estimators), or the folder of a campaign."""
+    """The plan, the name of a shipped one (navigators), or the folder of a campaign."""
     out: Path | None = None
     """Folder of the campaign; by default out/ and the plan's name."""
     jobs: int | None = None
@@ -158,11 +158,37 @@ class Report:
     """Folder of the campaign."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Identify:
+    """Fits the planar model's parameters to logs of manoeuvres and judges them on one that is held out.
+
+    Writes report.html, report.png and, if they predict better than those it started from, parameters.yaml, which
+    --estimator.model of `auvsim dock` takes. A log is a trial's, or a CSV or NetCDF file with named columns such as
+    `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading clockwise from north.
+    """
+
+    logs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LOG...")]
+    """Logs of manoeuvres, best two minutes or more of different kinds."""
+    out: Path = Path("out")
+    """Folder of parameters.yaml, report.html and report.png."""
+    holdout: tuple[Path, ...] = ()
+    """Logs to judge by; by default the kind of manoeuvre that teaches least."""
+    columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
+    """Which column is what, where names do not say: `rudder: {column: d, unit: deg, sign: -1}`."""
+    vehicle: str = "remus100"
+    """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit starts."""
+    name: str | None = None
+    """Also keep the parameters under this name, in models/<vehicle>/planar/."""
+    steps: tuple[str, ...] = ()
+    """Some of least-squares, segments, prediction-error; by default all."""
+
+
 Command = (
     Dock
     | Campaign
     | Report
     | Manoeuvre
+    | Identify
     | Video
     | Plot
     | Metrics
@@ -231,6 +257,14 @@ def _run(arguments: list[str]) -> int:
 
         plans = manoeuvre.plans(command.kinds, values, command.seed, command.trial)
         return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
+
+    if isinstance(command, Identify):
+        from auvsim.cli import identify
+
+        return identify.run(
+            command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
+            vehicle=command.vehicle, name=command.name, steps=command.steps,
+        )  # fmt: skip
 
     if isinstance(command, Reproduce):
         from auvsim.cli import reproduce

@@ -94,6 +94,16 @@ class DesignProgress(_Bar):
         self._show(done, total, f"{done / total:4.0%}")
 
 
+class IdentificationProgress(_Bar):
+    """Bar of an identification."""
+
+    def __init__(self) -> None:
+        super().__init__("identifying")
+
+    def __call__(self, text: str, share: float) -> None:
+        self._show(share, 1.0, text)
+
+
 class CampaignState(Protocol):
     """What a running campaign says of itself."""
 

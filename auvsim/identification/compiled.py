@@ -15,7 +15,7 @@ import numba
 
 from auvsim.identification import filter_loops, information_loops, segment_loops
 from estimators import loops
-from estimators.compiling import load
+from estimators.compiling import is_ready, load
 from estimators.kernels import python_source
 from estimators.planar_model import PARAMETER_NAMES, accelerations, step_function
 
@@ -39,6 +39,11 @@ def filters() -> ModuleType:
     return _load(
         "planar_record_filter", python_source(step_function(), "step", *arguments, scalars=("h",)), filter_loops
     )
+
+
+def is_warm() -> bool:
+    """Whether a fit starts at once; if not, the first one compiles for some seconds."""
+    return is_ready(segments().fold) and is_ready(filters().trace)
 
 
 def _linearise() -> str:

@@ -133,7 +133,7 @@ def trace(x, P, inputs, measured, variances, p, q, h, substeps):
 
 @compiled
 def smooth(means, covariances, inputs, p, q, h, substeps):
-    """Means (n, 12) of Rauch, Tung and Striebel's smoother from what `trace` gives; those, if a covariance is broken."""
+    """Means (n, 12) of Rauch, Tung and Striebel's smoother from what `trace` gives; as given if one breaks."""
     count = means.shape[0]
     smoothed = means.copy()
     F, work, following = np.eye(STATES), np.empty((STATES, STATES)), np.empty(8)

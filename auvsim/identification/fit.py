@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification.constraints import has_inertia, inertia
@@ -12,6 +13,9 @@ from auvsim.identification.records import MEASURED, Record
 from estimators.consistency import Whiteness, ljung_box
 from estimators.planar_model import PARAMETER_NAMES, PlanarParameters
 from estimators.types import Array
+
+Indices = NDArray[np.intp]
+Mask = NDArray[np.bool_]
 
 # Masses and added masses stay as they are: a motion shows only the ratios of forces to them. Coriolis terms (X_vr,
 # X_rr) follow from them. What is left of the model condensed from a vehicle: drag, thrust and its loss with speed, the
@@ -94,7 +98,7 @@ def with_values(parameters: PlanarParameters, names: Sequence[str], values: Arra
     return replace(parameters, **dict(zip(names, np.asarray(values, dtype=float).tolist(), strict=True)))
 
 
-def free_indices(free: Sequence[str]) -> Array:
+def free_indices(free: Sequence[str]) -> Indices:
     """Places (k,) of the free parameters among PARAMETER_NAMES.
 
     Raises:

@@ -6,7 +6,17 @@ import numpy as np
 
 from auvsim.errors import InputError
 from auvsim.identification import compiled
-from auvsim.identification.fit import DEFAULT_FREE, MASSES, Fit, Nuisances, check, free_indices, invert, with_values
+from auvsim.identification.fit import (
+    DEFAULT_FREE,
+    MASSES,
+    Fit,
+    Indices,
+    Nuisances,
+    check,
+    free_indices,
+    invert,
+    with_values,
+)
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.states import smoothed
 from estimators.planar_model import PlanarParameters
@@ -67,7 +77,7 @@ def fit_least_squares(
 
 
 def regress(
-    records: Sequence[Record], ways: Sequence[Array], start: PlanarParameters, indices: Array, window: float = 1.0
+    records: Sequence[Record], ways: Sequence[Array], start: PlanarParameters, indices: Indices, window: float = 1.0
 ) -> tuple[Array, Array, Array, Array]:
     """The linear step alone: values (k,), covariance (k, k), changes (w, 3) and the terms (w, 3, k) they are made of.
 
@@ -87,7 +97,7 @@ def regress(
 
 
 def _equations(
-    record: Record, way: Array, start: PlanarParameters, indices: Array, window: float
+    record: Record, way: Array, start: PlanarParameters, indices: Indices, window: float
 ) -> tuple[Array, Array]:
     """Changes of the velocities over windows (w, 3), without what is known, and the free terms' integrals (w, 3, k)."""
     p = start.vector()

@@ -12,7 +12,7 @@ from auvsim.condense import condense
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification import checks, judgement
 from auvsim.identification.constraints import SIGNS, limits
-from auvsim.identification.fit import DEFAULT_FREE, Fit
+from auvsim.identification.fit import DEFAULT_FREE, Fit, invert
 from auvsim.identification.identifiability import Identifiability, assess, likelihood_interval, sizes
 from auvsim.identification.judgement import Judged
 from auvsim.identification.least_squares import fit_least_squares
@@ -87,6 +87,7 @@ def identify(
     holdout: Readings | None = None,
     *,
     vehicle: str = "remus100",
+    model: str | None = None,
     start: PlanarParameters | None = None,
     free: Sequence[str] = DEFAULT_FREE,
     steps: Sequence[str] = STEPS,
@@ -97,7 +98,9 @@ def identify(
     Args:
         readings: What was read.
         holdout: What is held out; chosen from `readings` if None.
-        vehicle: Its masses, and if no start is given its condensed model, are where the fit starts.
+        vehicle: Whose parameters they are.
+        model: Its name in models/ or the path of its MJCF file, if that is another: its masses, and if no start is
+            given its condensed forces, are where the fit starts.
         start: Other parameters to start from.
         free: Names of those that are fitted.
         steps: Of STEPS, in their order.
@@ -110,17 +113,18 @@ def identify(
     say = progress or (lambda text, share: None)
     records = readings.records
     judging = holdout.records if holdout is not None else ()
-    speed = _speed(records, vehicle)
+    model = model or vehicle
+    speed = _speed(records, model)
     start_text = "parameters given" if start is not None else f"{vehicle} condensed at {speed:.2f} m/s"
-    start = start or condense(vehicle, speed).parameters
+    start = start or condense(model, speed).parameters
     checks.records((*records, *judging), start)
     said = "held out: as asked for"
     if not judging:
         records, judging, said = judgement.choose(records)
     checks.records(records, start)
-    fits, notes = _fits(records, start, free, steps, say)
+    fits, prior, notes = _fits(records, start, free, steps, say)
     fit = fits[-1]
-    assessed = assess(fit)
+    assessed = assess(fit if prior is None else _by_data_alone(fit, prior))
     intervals, profiled = _intervals(records, fits, assessed, say)
     say("predicting what was held out", 0.95)
     judged = tuple(judgement.judge(record, start, fit.parameters) for record in judging)
@@ -161,8 +165,8 @@ def _fits(
     free: Sequence[str],
     steps: Sequence[str],
     say: Callable[[str, float], None],
-) -> tuple[list[Fit], list[Verdict]]:
-    """The fit of each step, each from the one before, and what was done besides."""
+) -> tuple[list[Fit], float | None, list[Verdict]]:
+    """The fit of each step, each from the one before; the prior that was needed, if any, and what that means."""
     fits: list[Fit] = []
     notes: list[Verdict] = []
     prior = None
@@ -188,7 +192,17 @@ def _fits(
         say("prediction error", 0.3)
         before = fits[-1].parameters if "segments" in steps else start
         fits.append(fit_prediction_error(records, before, free, PredictionErrorOptions(signs=True, prior=prior)))
-    return fits, notes
+    return fits, prior, notes
+
+
+def _by_data_alone(fit: Fit, prior: float) -> Fit:
+    """The same with the covariance that the data alone would give."""
+    reach = prior * np.abs([getattr(fit.start, name) for name in fit.free])
+    believed = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+    known = np.isfinite(fit.deviations) & (fit.deviations > 0.0)
+    information = np.zeros_like(fit.covariance)
+    information[np.ix_(known, known)] = np.linalg.inv(fit.covariance[np.ix_(known, known)])
+    return replace(fit, covariance=invert(information - np.diag(np.where(known, believed, 0.0))))
 
 
 def _intervals(

@@ -18,7 +18,9 @@ from auvsim.identification import compiled
 from auvsim.identification.constraints import has_inertia, limits
 from auvsim.identification.fit import (
     DEFAULT_FREE,
+    MASSES,
     Fit,
+    Mask,
     Nuisances,
     check,
     free_indices,
@@ -26,6 +28,7 @@ from auvsim.identification.fit import (
     residual_summary,
     with_values,
 )
+from auvsim.identification.least_squares import regress
 from auvsim.identification.records import Record
 from auvsim.identification.states import first_belief, smoothed, substeps
 from estimators.planar_model import PlanarParameters
@@ -194,7 +197,8 @@ def fit_prediction_error(
 ) -> Fit:
     """Fits free parameters and densities of the process noise by the likelihood of a filter's innovations.
 
-    A polish: start it from a fit of segments. The covariance is the inverse of Fisher's information.
+    A polish: start it from a fit of segments that has converged; where least squares are likelier it begins there.
+    The covariance is the inverse of Fisher's information.
 
     Raises:
         InputError: Records, names or options that cannot be used, or a start with which the filter fails.
@@ -207,12 +211,28 @@ def fit_prediction_error(
     if len(options.densities) != len(NOISES) or not all(0.0 <= q < math.inf for q in options.densities):
         raise InputError(f"densities {options.densities} of the process noise must be {len(NOISES)} numbers >= 0")
     likelihood = Likelihood(records, start, free, options)
+    return likelihood.report(*_maximise(likelihood, _begin(likelihood)))
+
+
+def _begin(likelihood: Likelihood) -> _Point:
+    """The likelier of the start and of what least squares make of smoothed states.
+
+    Raises:
+        InputError: The filter fails with either.
+    """
+    options, start = likelihood.options, likelihood.start
     logs = np.log(np.maximum(np.array(options.densities)[likelihood.noisy], 1e-12))
-    unknowns = np.clip(np.concatenate([likelihood.centre[: len(free)], logs]), likelihood.low, likelihood.high)
-    point = likelihood.at(unknowns)
-    if not math.isfinite(point.cost):
-        raise InputError(f"the filter fails on {records[0].name} with the start's parameters; fit segments first")
-    return likelihood.report(*_maximise(likelihood, point))
+    candidates = [start.vector()[likelihood.indices]]
+    if not set(likelihood.free) & set(MASSES):
+        ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
+        candidates.append(regress(likelihood.records, ways, start, likelihood.indices)[0])
+    points = [
+        likelihood.at(np.clip(np.concatenate([values, logs]), likelihood.low, likelihood.high)) for values in candidates
+    ]
+    best = min(points, key=lambda point: point.cost)
+    if not math.isfinite(best.cost):
+        raise InputError(f"the filter fails on {likelihood.records[0].name} from the start; fit segments first")
+    return best
 
 
 def profile(
@@ -240,7 +260,7 @@ def profile(
     return lowest
 
 
-def _maximise(likelihood: Likelihood, point: _Point, fixed: Array | None = None) -> tuple[_Point, Array, int, bool]:
+def _maximise(likelihood: Likelihood, point: _Point, fixed: Mask | None = None) -> tuple[_Point, Array, int, bool]:
     """Fisher scoring, damped as by Levenberg and Marquardt; the point, its information, iterations, convergence."""
     options, damping = likelihood.options, 1e-4
     H, g = likelihood.information(point)
@@ -265,7 +285,7 @@ def _maximise(likelihood: Likelihood, point: _Point, fixed: Array | None = None)
     return point, H, options.max_iterations, False
 
 
-def _scored(H: Array, g: Array, damping: float, held: Array) -> Array:
+def _scored(H: Array, g: Array, damping: float, held: Mask) -> Array:
     """A damped step down, of equations scaled to a unit diagonal; zero in what is held."""
     loose = ~held & (np.diag(H) > 0.0)
     step = np.zeros(len(g))

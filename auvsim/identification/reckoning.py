@@ -30,14 +30,15 @@ def strays(signals: Mapping[str, tuple[Array, Array]], deviation: float) -> NDAr
     first = np.clip(np.arange(n) - WINDOW // 2, 0, n - WINDOW)
     members = first[:, None] + np.arange(WINDOW)
     middle = times[:, None]
-    columns = np.stack([np.ones(members.shape), times[members] - middle, way[members] - way[:, None]], axis=-1)
+    ones = np.ones(members.shape, dtype=complex)
+    columns = np.stack([ones, times[members] - middle + 0j, way[members] - way[:, None]], axis=-1)
     residuals = _least_absolute(columns, places[members])
     own = np.abs(residuals[np.arange(n), np.arange(n) - first])
     usual = np.median(np.abs(residuals), axis=1)
     return own > 6.0 * np.maximum(deviation, usual)
 
 
-def reckoned(signals: Mapping[str, tuple[Array, Array]], times: Array) -> Array:
+def reckoned(signals: Mapping[str, tuple[Array, Array]], times: Array) -> NDArray[np.complex128]:
     """Dead reckoning (n,) at `times`, north + i east [m], from zero; along the heading at 1 m/s without velocities."""
     clock, heading = signals["heading"]
     over, water = ("ground_surge", "ground_sway"), ("surge", "sway")

@@ -18,6 +18,8 @@ from auvsim.identification.fit import (
     DEFAULT_FREE,
     MASSES,
     Fit,
+    Indices,
+    Mask,
     Nuisances,
     check,
     free_indices,
@@ -62,7 +64,7 @@ class _Cut(NamedTuple):
     inputs: Array
     measured: Array
     weights: Array  # (8,)
-    bounds: Array  # (s + 1,)
+    bounds: Indices  # (s + 1,)
     held: Array  # (s, 6) first states about which they are held
 
 
@@ -177,7 +179,7 @@ class Problem:
             starts.append(point.starts[r] + back[:, :, -1] - back[:, :, here] @ step[places])
         return self.at(point.values + step[:k], nuisances, starts)
 
-    def _places(self, r: int) -> tuple[Array, Array]:
+    def _places(self, r: int) -> tuple[Indices, Indices]:
         """Places of a record's unknowns among all, and among those of its own equations."""
         k = len(self.free)
         before = k + int(self.active[:r].sum())
@@ -231,7 +233,7 @@ def _begin(problem: Problem, states: Sequence[Array]) -> _Point:
     return other if other.cost < point.cost else point
 
 
-def minimise(problem: Problem, point: _Point, tolerance: float, fixed: Array | None = None) -> tuple[_Point, int, bool]:
+def minimise(problem: Problem, point: _Point, tolerance: float, fixed: Mask | None = None) -> tuple[_Point, int, bool]:
     """Levenberg and Marquardt's way down, on unknowns in units of their own curvature.
 
     Args:
@@ -306,9 +308,9 @@ def _cut(record: Record, length: float, states: Array) -> _Cut:
     )
 
 
-def active_nuisances(record: Record, deviations: Array) -> Array:
+def active_nuisances(record: Record, deviations: Array) -> Mask:
     """Which nuisances (6,) a record has: those that are believed possible and touch a channel that was measured."""
-    north, east, heading, surge, sway, rate, over_u, over_v = np.isfinite(record.measured).any(axis=0)
+    north, east, heading, surge, sway, rate, over_u, over_v = map(bool, np.isfinite(record.measured).any(axis=0))
     log, ground = surge or sway or over_u or over_v, north or east or over_u or over_v
     current = ground and record.current is None
     return np.array([current, current, rate, heading, log, log]) & (deviations > 0.0)

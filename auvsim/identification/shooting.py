@@ -5,7 +5,7 @@ Nothing of the compiled loops is used here: motion, measurements and derivatives
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import casadi as ca
 import numpy as np
@@ -184,7 +184,7 @@ class _Problem:
         """With the start's parameters and all else at its best, to second order about the solution."""
         k = len(self.free)
         aside = self.first[:k] - unknowns[:k]
-        information = np.linalg.inv(self._covariance(unknowns)[:k, :k])
+        information = np.linalg.pinv(self._covariance(unknowns)[:k, :k])
         e = np.array(self.residual(unknowns)).ravel()
         return 0.5 * float(e @ e + aside @ information @ aside)
 
@@ -278,5 +278,5 @@ def _inertia(p: ca.MX) -> ca.MX:
     return ca.vertcat(m - X_ud, across, across * along - (m * x_g - 0.5 * (Y_rd + N_vd)) ** 2)
 
 
-def _sparse(matrix: ca.DM) -> sp.csc_array:
+def _sparse(matrix: ca.DM) -> Any:
     return sp.csc_array(matrix.sparse())

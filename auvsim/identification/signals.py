@@ -145,7 +145,7 @@ def _spans(signals: Signals) -> Iterator[tuple[float, float]]:
 
 
 def _gridded(signals: Signals, start: float, stop: float, step: float, name: str) -> Record:
-    times: Array = start + step * np.arange(math.floor((stop - start) / step + 1e-6) + 1)
+    times = start + step * np.arange(math.floor((stop - start) / step + 1e-6) + 1, dtype=np.float64)
     given = signals.signals
     inputs = np.column_stack([_means(given[quantity], times, step) for quantity in INPUTS])
     measured, deviations = np.full((len(times), len(MEASURED)), np.nan), np.ones(len(MEASURED))

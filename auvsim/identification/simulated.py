@@ -60,7 +60,7 @@ def simulate(vessel: Vessel, kind: Kind, seed: int, duration: float = 300.0, ste
         InputError: There is no such manoeuvre.
     """
     generator = np.random.default_rng(seed)
-    times = np.arange(round(duration / step)) * step
+    times = step * np.arange(round(duration / step), dtype=np.float64)
     inputs = _inputs(vessel, kind, times, generator)
     nuisances = vessel.errors.vector() * generator.standard_normal(6)
     start = np.array([0.0, 0.0, generator.uniform(-math.pi, math.pi), vessel.surge, 0.0, 0.0, *nuisances[:2]])

@@ -1,6 +1,7 @@
 """Plans: what is drawn, that nothing disturbs anything else, that what is given is pinned."""
 
 import copy
+from functools import partial
 from pathlib import Path
 from zlib import crc32
 
@@ -10,7 +11,7 @@ from numpy.random import PCG64, Generator, SeedSequence
 from scipy import stats
 
 from auvsim.errors import InputError
-from auvsim.sampling import default_plan, draw, is_distribution, load_plan, merge
+from auvsim.sampling import check, default_plan, draw, is_distribution, load_plan, merge
 from auvsim.scenario import Scenario, parse
 
 LEAVES = {
@@ -105,10 +106,15 @@ def test_draw_leaves_the_plan_alone() -> None:
         ({"uniform": [-2, 3]}, stats.uniform(-2, 5)),
         ({"normal": [1, 0.5]}, stats.norm(1, 0.5)),
         ({"log_uniform": [1e-3, 10]}, stats.loguniform(1e-3, 10)),
+        ({"truncated_normal": [1, 0.5, 0.8, 3]}, stats.truncnorm(-0.4, 4, 1, 0.5)),
     ],
 )
 def test_distributions_have_their_laws(leaf: dict, law) -> None:
-    """Kolmogorov-Smirnov against SciPy's own."""
+    """Kolmogorov-Smirnov against SciPy's own; the quantiles are SciPy's, too."""
+    for share in (0.0, 1e-3, 0.3, 0.5, 0.999):
+        if share > 0.0 or "normal" not in leaf:  # whose lowest value is that of its smallest quantile in floats
+            # 1e-9: what the inverses of both libraries are good for.
+            assert draw({"x": leaf}, 1, 0, quantiles={"x": share})["x"] == pytest.approx(law.ppf(share), rel=1e-9)
     drawn = [draw({"x": leaf}, 1, trial)["x"] for trial in range(1000)]
     assert all(type(value) is float for value in drawn)
     assert stats.kstest(drawn, law.cdf).pvalue > SIGNIFICANCE
@@ -146,14 +152,18 @@ def test_distributions_in_lists() -> None:
         ({"log_uniform": [0, 1]}, "needs 0 < low <= high"),
         ({"choice": []}, "needs a list of values"),
         ({"choice": 3}, "needs a list of values"),
+        ({"truncated_normal": [0, 1, 2]}, "needs four numbers, [mean, standard deviation, low, high]"),
+        ({"truncated_normal": [0, 0, -1, 1]}, "needs a standard deviation above 0 and low < high"),
+        ({"truncated_normal": [0, 1, 9, 10]}, "hardly anything of this normal lies between"),
     ],
 )
 def test_senseless_distributions_are_named(leaf: dict, text: str) -> None:
     """Place, key, what stands there, what would be right."""
-    with pytest.raises(InputError) as error:
-        draw({"a": {"b": leaf}}, 1, places={"a": "s.yaml:3"})
-    assert str(error.value).startswith("s.yaml:3: a.b: {")
-    assert text in str(error.value)
+    for refuse in (partial(draw, seed=1), check):
+        with pytest.raises(InputError) as error:
+            refuse({"a": {"b": leaf}}, places={"a": "s.yaml:3"})
+        assert str(error.value).startswith("s.yaml:3: a.b: {")
+        assert text in str(error.value)
 
 
 def test_another_kind_drops_the_keys_of_the_old_one() -> None:

@@ -1,4 +1,4 @@
-"""Prediction error: its likelihood against a filter written anew, its derivatives, and fits under noise of the process."""
+"""Prediction error: likelihood against a filter written anew, derivatives, and fits under noise of the process."""
 
 import math
 from dataclasses import replace

@@ -1,0 +1,19 @@
+"""What the trials cost."""
+
+from auvsim.campaign.report.content import Content, quantile, values
+from auvsim.campaign.report.markup import Markup, number, right, table, tag
+from auvsim.campaign.report.success import name_cell
+
+HEADS = ("trials", "median wall time [s]", "95 %", "all together [h]", "times real time, median")
+
+
+def section(content: Content) -> Markup:
+    """Wall-clock time of a trial, one line for each variant."""
+    rows = []
+    for index, name in enumerate(content.variants):
+        trials = content.rows_of(name)
+        walls, factors = values(trials, "wall_time"), values(trials, "real_time_factor")
+        numbers = [quantile(walls, 0.5), quantile(walls, 0.95), sum(walls) / 3600.0, quantile(factors, 0.5)]
+        cells = [tag("td", text, class_="n") for text in (len(walls), *map(number, numbers))]
+        rows.append(tag("tr", name_cell(index, name), cells, data_variant=index))
+    return table(["", *map(right, HEADS)], rows, aria_label="cost")

@@ -1,0 +1,26 @@
+"""What goes to a worker, and what comes back."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Task:
+    """One trial to run."""
+
+    variant: str
+    trial: int
+    seed: int
+    values: Mapping[str, Any]  # of its scenario, all definite
+    keep: str = "none"  # of which trials the log is wanted: none, failures or all
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Result:
+    """What became of it."""
+
+    summary: dict[str, Any] | None  # `metrics.Summary`, without what depends on the machine
+    error: dict[str, str] | None  # type, message and traceback of what it raised
+    run: dict[str, Any]  # what may differ from run to run
+    log: bytes | None = None  # NetCDF

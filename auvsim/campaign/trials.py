@@ -1,0 +1,114 @@
+"""One trial of a campaign: what a worker does with it, and what becomes of it."""
+
+import os
+import platform
+import re
+import time
+import traceback
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from auvsim import metrics, scenario
+from auvsim.campaign.task import Result, Task
+from auvsim.errors import InputError
+from auvsim.log import VERSIONS, TrialLog, pack
+from auvsim.recorder import version
+
+WARM_UP = 30.0  # simulated time in which all is called, and so compiled, that a whole trial calls [s]
+ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")  # of an object in memory: other in every process
+
+
+def run(task: Task) -> Result:
+    """Runs a trial; whatever it raises becomes part of the result."""
+    started, busy = time.perf_counter(), time.process_time()
+    log, summary, error = None, None, None
+    try:
+        log = _simulate(task.values, task.seed, task.trial)
+        summary = metrics.summarise(log).to_dict()
+        summary.pop("real_time_factor")
+    except Exception as raised:
+        error = {
+            "type": type(raised).__name__,
+            "message": ADDRESS.sub("0x...", str(raised)),
+            "traceback": ADDRESS.sub("0x...", traceback.format_exc()),
+        }
+    failed = summary is None or not summary["docked"]
+    wanted = log is not None and (task.keep == "all" or (task.keep == "failures" and failed))
+    return Result(
+        summary=summary,
+        error=error,
+        run={
+            "wall_time": time.perf_counter() - started,
+            "cpu_time": time.process_time() - busy,
+            "host": platform.node(),
+            "process": os.getpid(),
+        },
+        log=pack(log) if wanted and log is not None else None,
+    )
+
+
+def prepare(tasks: Sequence[Task]) -> str | None:
+    """Sees that trials can be set up, and compiles what is not compiled yet, so that it is done once.
+
+    Returns:
+        What is wrong with a vehicle, dock, estimator or number; None if nothing is.
+    """
+    from auvsim import fluid, navigation
+    from auvsim.trial import Loop
+
+    cold = not fluid.is_warm()
+    for task in tasks:
+        parsed = scenario.parse(task.values)
+        try:
+            Loop(parsed, task.seed, task.trial)
+        except InputError as error:
+            return f"variant '{task.variant}': {error}"
+        if cold and parsed.estimator.factory in navigation.FACTORIES:  # not what may do anything
+            _simulate(task.values, task.seed, task.trial, WARM_UP)
+    return None
+
+
+def record(task: Task, result: Result, keys: Sequence[str], retries: int) -> dict[str, Any]:
+    """What the file of a finished trial holds.
+
+    Args:
+        task: The trial.
+        result: What became of it.
+        keys: Dotted keys of its scenario that are worth a column.
+        retries: How often it was run again, because its process had died.
+    """
+    return {
+        "variant": task.variant,
+        "trial": task.trial,
+        "seed": task.seed,
+        "scenario": {key: _at(task.values, key) for key in keys},
+        "summary": result.summary,
+        "error": result.error,
+        "run": {**result.run, "retries": retries},
+    }
+
+
+def versions() -> dict[str, str]:
+    """Of the packages on which results depend."""
+    return {package: version(package) for package in VERSIONS.values()}
+
+
+def _simulate(values: Mapping, seed: int, trial: int, duration: float | None = None) -> TrialLog:
+    from auvsim.trial import run_trial
+
+    parsed = scenario.parse(values)
+    if duration is not None:
+        parsed = parsed.model_copy(update={"duration": min(duration, parsed.duration)})
+    return run_trial(parsed, seed=seed, trial=trial)
+
+
+def _at(values: Any, key: str) -> Any:
+    """The value of a dotted key; None where there is no such key."""
+    for part in key.split("."):
+        if isinstance(values, Mapping):
+            values = values.get(part)
+        elif isinstance(values, list | tuple) and part.isdigit() and int(part) < len(values):
+            values = values[int(part)]
+        else:
+            return None
+    return values
