@@ -131,7 +131,7 @@ class InteractingFilter:
             rejected = (*state.rejected, now)
             count += 1
         accepted = state.accepted + (not rejected)
-        transition = expm(max(SHORTEST, fix.stamp - state.last_fix) * self._generator)
+        transition = np.asarray(expm(max(SHORTEST, fix.stamp - state.last_fix) * self._generator), dtype=float)
         beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)
         return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation)
 

@@ -1,5 +1,5 @@
 """Campaigns: many trials of a plan on all cores or a cluster, none lost, and what they come to.
 
-`execution.run(plan.load("estimators"), Path("out"))` runs what its folder does not hold yet; each finished trial is a
+`execution.run(plan.load("navigators"), Path("out"))` runs what its folder does not hold yet; each finished trial is a
 file of its own there (`folder`), of which everything else is made: `table`, `statistics`, `report`.
 """

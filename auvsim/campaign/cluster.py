@@ -44,15 +44,15 @@ class Cluster:
             import distributed
         except ImportError:
             raise InputError("the engine dask needs Dask: pip install 'auvsim[cluster]'") from None
-        for handler in logging.getLogger("distributed").handlers:
-            handler.setLevel(logging.CRITICAL)  # of what matters it tells by exceptions; this is pages of tracebacks
+        _hush()
         with contextlib.ExitStack() as starting:
-            if address is None:
+            local = address is None
+            if local:
                 cluster = distributed.LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=":0")
                 address = starting.enter_context(cluster).scheduler_address
             try:
                 self._client = starting.enter_context(distributed.Client(address, timeout=CONNECTING))
-                self._client.wait_for_workers(1, timeout=CONNECTING)
+                self._client.wait_for_workers(jobs if local else 1, timeout=CONNECTING)
             except (OSError, TimeoutError, ValueError) as error:
                 text = " ".join(str(error).split()) or type(error).__name__
                 raise InputError(f"no Dask cluster at {address}: {text}") from None
@@ -84,6 +84,7 @@ class Cluster:
 
         try:
             submit(AHEAD * self.jobs)
+            looked = time.monotonic()
             while under_way:
                 future = self._next(finished)
                 task = under_way.pop(future)
@@ -91,6 +92,9 @@ class Cluster:
                 future.release()
                 yield task, outcome
                 submit(1)
+                if time.monotonic() > looked + WATCH:  # a cluster may grow
+                    submit(max(AHEAD * self._workers() - len(under_way), 0))
+                    looked = time.monotonic()
         finally:
             with contextlib.suppress(Exception):
                 self._client.cancel(list(under_way), force=True)
@@ -129,6 +133,16 @@ class Cluster:
 
 def _lost(what: str) -> AuvsimError:
     return AuvsimError(f"the {what}; what is finished is kept, the same command goes on from there")
+
+
+def _hush() -> None:
+    """Keeps Dask's log off the terminal: what matters it tells by exceptions, the rest is pages of tracebacks."""
+    for name in logging.root.manager.loggerDict:
+        if name.partition(".")[0] == "distributed":
+            logging.getLogger(name).handlers.clear()
+    logger = logging.getLogger("distributed")
+    logger.addHandler(logging.NullHandler())
+    logger.propagate = False
 
 
 def call(message: bytes, timeout: float) -> bytes | Death:

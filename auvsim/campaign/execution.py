@@ -95,7 +95,7 @@ def prepare(plan: Plan, engine: Engine) -> None:
     """
     count = min(len(plan.cells), plan.settings.trials)
     first = tuple(task(plan, variant, trial) for variant in plan.variants for trial in range(count))
-    for _, wrong in engine.run(trials.prepare, [first], timeout=PREPARATION):
+    for _, wrong in engine.run(trials.prepare, [(first, trials.versions())], timeout=PREPARATION):
         if isinstance(wrong, Death):
             last = wrong.output.strip().splitlines()[-1:]
             raise InputError(": ".join(["the first trials cannot be set up: the process " + wrong.reason, *last]))
@@ -107,8 +107,7 @@ def _run_blocks(folder: Folder, engine: Engine, tally: "_Tally") -> int | None:
     """Runs block after block; the trials of each variant after which the stopping rule was met, or None."""
     settings = folder.plan.settings
     for block in design.blocks(settings.trials, settings.stop.block if settings.stop else None):
-        missing = tally.skip(folder, block)
-        for record, log in _finished(folder.plan, engine, missing):
+        for record, log in _finished(folder.plan, engine, tally.missing(folder, block)):
             folder.save(record, log)
             tally.add(record)
         if settings.stop and block.stop < settings.trials and tally.narrow(settings.stop.width, block.stop):
@@ -140,7 +139,7 @@ def charged(death: Death) -> Result:
     """The result of a trial that ended its process twice."""
     error = {
         "type": "Hung" if death.hung else "Died",
-        "message": f"its process {death.reason}, twice",
+        "message": f"its process {death.reason}; it had not finished the first time either",
         "traceback": "",
     }
     return Result(summary=None, error=error, run={"output": death.output})
@@ -155,17 +154,15 @@ class _Tally:
         self._done = self._errors = self._here = 0
         self._started = time.monotonic()
 
-    def skip(self, folder: Folder, block: range) -> list[tuple[str, int]]:
-        """Counts what of a block is done already, and returns what is not."""
-        missing = []
+    def missing(self, folder: Folder, block: range) -> Iterator[tuple[str, int]]:
+        """What of a block is not done yet, one at a time; what is done already is counted on the way."""
         for trial in block:  # variants side by side: a campaign that is cut short has compared the same trials
             for variant in self._variants:
                 record = folder.read(variant, trial)
                 if record is None:
-                    missing.append((variant, trial))
+                    yield variant, trial
                 else:
                     self._count(record)
-        return missing
 
     def add(self, record: Record) -> None:
         """Counts a trial that has just finished."""

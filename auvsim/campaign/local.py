@@ -132,13 +132,16 @@ class Pool:
     def __init__(self, jobs: int) -> None:
         self.jobs = jobs
         self._idle: list[Process] = []
+        self._busy: dict[Any, Process] = {}
 
     def __enter__(self) -> "Pool":
         return self
 
     def __exit__(self, *reason: object) -> None:
-        while self._idle:
-            self._idle.pop().kill()
+        for process in [*self._idle, *self._busy.values()]:
+            process.kill()
+        self._idle.clear()
+        self._busy.clear()
 
     def run(self, function: Callable[[Any], Any], tasks: Iterable[Any], *, timeout: float) -> Iterator[tuple[Any, Any]]:
         """Each task with what the function returns for it, or a Death, in the order in which they end.
@@ -148,8 +151,7 @@ class Pool:
             tasks: Taken one by one, as processes become free.
             timeout: After which a task counts as hung [s].
         """
-        remaining = iter(tasks)
-        busy: dict[Any, Process] = {}
+        remaining, busy = iter(tasks), self._busy
         try:
             while True:
                 for task in islice(remaining, self.jobs - len(busy)):
@@ -167,3 +169,4 @@ class Pool:
         finally:
             for process in busy.values():
                 process.kill()
+            busy.clear()

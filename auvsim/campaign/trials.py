@@ -12,7 +12,7 @@ from auvsim import metrics, scenario
 from auvsim.campaign.task import Result, Task
 from auvsim.errors import InputError
 from auvsim.log import VERSIONS, TrialLog, pack
-from auvsim.recorder import version
+from auvsim.recorder import version as installed
 
 WARM_UP = 30.0  # simulated time in which all is called, and so compiled, that a whole trial calls [s]
 ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")  # of an object in memory: other in every process
@@ -29,8 +29,8 @@ def run(task: Task) -> Result:
     except Exception as raised:
         error = {
             "type": type(raised).__name__,
-            "message": ADDRESS.sub("0x...", str(raised)),
-            "traceback": ADDRESS.sub("0x...", traceback.format_exc()),
+            "message": _same_each_time(str(raised)),
+            "traceback": _same_each_time(traceback.format_exc()),
         }
     failed = summary is None or not summary["docked"]
     wanted = log is not None and (task.keep == "all" or (task.keep == "failures" and failed))
@@ -47,15 +47,22 @@ def run(task: Task) -> Result:
     )
 
 
-def prepare(tasks: Sequence[Task]) -> str | None:
+def prepare(what: tuple[Sequence[Task], Mapping[str, str]]) -> str | None:
     """Sees that trials can be set up, and compiles what is not compiled yet, so that it is done once.
 
+    Args:
+        what: The trials, and the versions of packages that there must be.
+
     Returns:
-        What is wrong with a vehicle, dock, estimator or number; None if nothing is.
+        What is wrong with a vehicle, dock, estimator, number or version; None if nothing is.
     """
     from auvsim import fluid, navigation
     from auvsim.trial import Loop
 
+    tasks, wanted = what
+    for package, version in versions().items():
+        if version != wanted[package]:
+            return f"the workers have {package} {version}, and this is {wanted[package]}; install the same"
     cold = not fluid.is_warm()
     for task in tasks:
         parsed = scenario.parse(task.values)
@@ -90,7 +97,7 @@ def record(task: Task, result: Result, keys: Sequence[str], retries: int) -> dic
 
 def versions() -> dict[str, str]:
     """Of the packages on which results depend."""
-    return {package: version(package) for package in VERSIONS.values()}
+    return {package: installed(package) for package in VERSIONS.values()}
 
 
 def _simulate(values: Mapping, seed: int, trial: int, duration: float | None = None) -> TrialLog:
@@ -100,6 +107,11 @@ def _simulate(values: Mapping, seed: int, trial: int, duration: float | None = N
     if duration is not None:
         parsed = parsed.model_copy(update={"duration": min(duration, parsed.duration)})
     return run_trial(parsed, seed=seed, trial=trial)
+
+
+def _same_each_time(text: str) -> str:
+    """Text of an error without what is of one process only, and fit for any file."""
+    return ADDRESS.sub("0x...", text).encode(errors="replace").decode()
 
 
 def _at(values: Any, key: str) -> Any:

@@ -14,6 +14,8 @@ from auvsim.cli import dock
 from auvsim.cli.report import CampaignProgress
 from auvsim.errors import InputError, unknown_name
 
+SHOWN = ("variant", "trial", "error_type", *statistics.RATES, *statistics.MEANS)  # columns that the command needs
+WIDTH = 120  # of what is printed where there is no terminal [columns]
 OUT = Path("out")  # folders of campaigns lie in it, if --out does not say otherwise
 
 
@@ -92,18 +94,12 @@ def _report(done: Folder) -> None:
 
 def show(done: Folder) -> None:
     """Prints the rates of each variant and its differences from the first."""
-    rows, variants = list(table.rows(done)), done.plan.variants
+    variants = done.plan.variants
+    rows = [{key: row[key] for key in SHOWN} for row in table.rows(done)]  # of many trials all columns would be much
     rates = {(rate.variant, rate.quantity): rate for rate in statistics.rates(rows, variants)}
     less = {(d.variant, d.quantity): d for d in statistics.differences(rows, variants)}
     found = Table(title=f"{done.plan.settings.name}: {len(rows)} docking trials, seed {done.plan.settings.seed}")
-    for heading in (
-        "variant",
-        "trials",
-        "docked [%]",
-        "first attempt [%]",
-        f"the latter less {variants[0]} [points]",
-        "errors",
-    ):
+    for heading in ("variant", "trials", "docked [%]", "first attempt [%]", "difference [points]", "errors"):
         found.add_column(heading, justify="left" if heading == "variant" else "right")
     for variant in variants:
         docked = rates[variant, "docked"]
@@ -111,7 +107,7 @@ def show(done: Folder) -> None:
         errors = sum(row["variant"] == variant and row["error_type"] is not None for row in rows)
         shares = [_share(rates[variant, quantity]) for quantity in statistics.RATES]
         found.add_row(variant, str(docked.trials), *shares, _less(difference), str(errors))
-    Console(markup=False).print(found)
+    Console(markup=False, width=None if Console().is_terminal else WIDTH).print(found)
 
 
 def _share(rate: statistics.Rate) -> str:

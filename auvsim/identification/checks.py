@@ -160,6 +160,7 @@ def records(found: Sequence[Record], start: PlanarParameters) -> None:
             f"{total:.0f} s of data in spans of 10 s or more; a fit needs {LEAST:g} s at the very least, two "
             "manoeuvres of two minutes each are better"
         )
+    _answer(found, start)
     moved = max(float(np.std(record.inputs[:, 0])) for record in found)
     if moved < STILL:
         at = np.degrees(np.mean(np.concatenate([record.inputs[:, 0] for record in found])))
@@ -167,7 +168,6 @@ def records(found: Sequence[Record], start: PlanarParameters) -> None:
             f"the rudder stays at {at:.1f} deg throughout: nothing in sway and yaw can be learnt; "
             "log a zig-zag, turns to both sides, or a multisine"
         )
-    _answer(found, start)
 
 
 def _answer(found: Sequence[Record], start: PlanarParameters) -> None:

@@ -69,10 +69,11 @@ def choose(records: Sequence[Record]) -> tuple[list[Record], list[Record], str]:
         rest = [r for r in records if r.kind != kind]
         if _moves(rest) and _moves(kinds[kind]) and max(r.duration for r in kinds[kind]) >= LEAST:
             return rest, kinds[kind], f"held out: {kind or 'what has no name'}, all of it"
-    if len(records) > 1 and records[-1].duration >= LEAST and _moves(records[:-1]):
-        said = f"held out: {records[-1].name}, a manoeuvre of the same kind: another kind would say more"
-        return list(records[:-1]), [records[-1]], said
-    longest = max(records, key=lambda r: r.duration)
+    for last in reversed(records):
+        rest = [r for r in records if r is not last]
+        if _moves(rest) and _moves([last]) and last.duration >= LEAST:
+            return rest, [last], f"held out: {last.name}, a manoeuvre of the same kind: another kind would say more"
+    longest = max(records, key=lambda r: (_moves([r]), r.duration))
     first = round(len(longest.times) * (1.0 - PART))
     if longest.duration * PART < LEAST:
         raise InputError(
@@ -80,7 +81,7 @@ def choose(records: Sequence[Record]) -> tuple[list[Record], list[Record], str]:
             f"{LEAST / PART:.0f} s, or better two manoeuvres of different kinds"
         )
     early, late = part(longest, 0, first + 1), part(longest, first, len(longest.times))
-    said = f"held out: the last {late.duration:.0f} s of the only record: another manoeuvre would say more"
+    said = f"held out: the last {late.duration:.0f} s of {longest.name}: another manoeuvre would say more"
     return [early if r is longest else r for r in records], [late], said
 
 

@@ -308,6 +308,6 @@ def _identifiable(found: Identification) -> list[Verdict]:
 def _joined(readings: Readings, holdout: Readings | None) -> Readings:
     if holdout is None:
         return readings
-    return Readings(
-        records=readings.records, sources=readings.sources, notes=(*readings.notes, *holdout.notes)
-    )  # fmt: skip
+    sources = dict.fromkeys((*readings.sources, *holdout.sources))
+    notes = (*readings.notes, *holdout.notes)
+    return Readings(records=readings.records, sources=tuple(sources), notes=notes)

@@ -25,7 +25,7 @@ from auvsim.identification.fit import (
     with_values,
 )
 from auvsim.identification.records import Record
-from auvsim.identification.segments import active_nuisances
+from auvsim.identification.segment_problem import active_nuisances
 from auvsim.identification.states import smoothed, substeps
 from estimators.planar_model import PARAMETER_NAMES, PlanarParameters, accelerations
 from estimators.types import Array
@@ -171,12 +171,12 @@ class _Problem:
     def _covariance(self, unknowns: Array) -> Array:
         """Of scaled parameters and nuisances: the corner of the inverse of the constrained normal equations."""
         J = _sparse(ca.Function("J", [self.w], [ca.jacobian(self.residual(self.w), self.w)])(unknowns))
-        A = _sparse(ca.Function("A", [self.w], [ca.jacobian(self.constraint(self.w), self.w)])(unknowns))
-        A = A[: self.continuity]
+        gaps = self.constraint(self.w)[: self.continuity]
+        A = _sparse(ca.Function("A", [self.w], [ca.jacobian(gaps, self.w)])(unknowns))
         head = len(self.free) + int(self.active.sum())
         ridge = sp.diags_array(np.full(J.shape[1], 1e-12))
         system = sp.block_array([[J.T @ J + ridge, A.T], [A, None]], format="csc")
-        right = np.zeros((system.shape[0], head))
+        right = np.zeros((J.shape[1] + self.continuity, head))
         right[:head] = np.eye(head)
         return splu(system).solve(right)[:head]
 

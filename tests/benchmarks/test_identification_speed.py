@@ -16,7 +16,8 @@ from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, NO_NUISANCES, with_values
 from auvsim.identification.least_squares import fit_least_squares
 from auvsim.identification.prediction_error import PredictionErrorOptions, fit_prediction_error
-from auvsim.identification.segments import Problem, SegmentOptions, fit_segments
+from auvsim.identification.segment_problem import Problem
+from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
 from auvsim.identification.states import smoothed
 from estimators.planar_model import PARAMETER_NAMES, PlanarParameters, PlanarProcess

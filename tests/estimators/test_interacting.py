@@ -172,6 +172,7 @@ def test_modes_change_with_time_and_not_with_the_number_of_fixes(interval):
 
     heading = Measurement(kind=COMPASS, value=np.zeros(1), covariance=np.eye(1), stamp=0.0, received=0.0)
     state = docking.start([Node(0.0, (0.0, 0.0), [heading, fix(0.0)], is_grid=True)], 0)
+    assert state is not None
     for k in range(round(duration / interval)):
         stamp = (k + 1) * interval
         state = docking.correct(docking.predict(state, (0.0, 0.0), interval), stamp, [fix(stamp)])

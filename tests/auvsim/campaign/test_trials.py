@@ -148,3 +148,12 @@ def test_what_cannot_be_set_up_is_refused_before_anything_runs(pins: dict, text:
     with pytest.raises(InputError, match=text):
         execution.run(wrong, tmp_path / "c", Here())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_workers_need_the_same_versions() -> None:
+    """Results of others would not be of one kind."""
+    from auvsim.campaign import trials
+
+    versions = trials.versions() | {"mujoco": "3.0.0"}
+    assert "the workers have mujoco 3.1" in str(trials.prepare(([], versions)))
+    assert trials.prepare(([], trials.versions())) is None

@@ -26,14 +26,15 @@ def without(table: Table, *names: str) -> Table:
 
 
 WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
-    "rudder in degrees named radians": (lambda t: renamed(t, "rudder [deg]", "rudder [rad]"), "name the column `rudder"),
+    "rudder in degrees named radians": (
+        lambda t: renamed(t, "rudder [deg]", "rudder [rad]"), "name the column `rudder"),
     "rudder in radians named degrees": (
         lambda t: {**t, "rudder [deg]": np.radians(t["rudder [deg]"])}, "in other units than its header says"),
     "heading in degrees named radians": (
         lambda t: renamed(t, "heading [deg]", "heading [rad]"), "these are degrees; name it `heading [deg]`"),
     "heading in degrees without a unit": (lambda t: renamed(t, "heading [deg]", "heading"), "`heading [deg]`"),
     "heading in degrees that never wraps": (
-        lambda t: {**without(t, "heading"), "heading [rad]": (t["heading [deg]"] - 180.0) % 360.0 / 10.0 * 10.0},
+        lambda t: {**without(t, "heading"), "heading [rad]": np.unwrap(t["heading [deg]"], period=360.0)},
         "`heading [deg]`"),
     "heading in radians named degrees": (
         lambda t: {**t, "heading [deg]": np.radians(t["heading [deg]"])}, "radians"),
@@ -46,13 +47,13 @@ WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
     "constant rudder": (lambda t: {**t, "rudder [deg]": 0.0 * t["rudder [deg]"] + 5.0}, "the rudder stays at 5.0 deg"),
     "three seconds of data": (lambda t: {name: values[:30] for name, values in t.items()}, "a fit needs 20 s"),
     "twelve seconds of data": (lambda t: {name: values[:125] for name, values in t.items()}, "12 s of data"),
-    "a column of NaN": (lambda t: {**t, "heading [deg]": np.full(len(t["time [s]"]), np.nan)}, "holds no number at all"),
+    "a column of NaN": (lambda t: {**t, "heading [deg]": np.nan * t["time [s]"]}, "holds no number at all"),
     "reversed rudder": (lambda t: {**t, "rudder [deg]": -t["rudder [deg]"]}, "the vehicle turns against its rudder"),
     "reversed rudder without a gyro": (
         lambda t: without({**t, "rudder [deg]": -t["rudder [deg]"]}, "yaw_rate"), "sign: -1"),
     "reversed gyro": (lambda t: {**t, "yaw_rate [deg/s]": -t["yaw_rate [deg/s]"]}, "turn opposite ways"),
     "time that goes back": (
-        lambda t: {**t, "time [s]": np.where(np.arange(len(t["time [s]"])) == 400, 31.0, t["time [s]"])}, "sort the rows"),
+        lambda t: {**t, "time [s]": np.where(np.isclose(t["time [s]"], 40.0), 31.0, t["time [s]"])}, "sort the rows"),
     "no rudder": (lambda t: without(t, "rudder"), "no column is the rudder"),
     "no heading": (lambda t: without(t, "heading", "yaw_rate"), "neither heading nor yaw rate"),
     "two headings": (lambda t: {**t, "psi [rad]": t["time [s]"]}, "are both heading"),

@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 from auvsim.errors import InputError
 from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, NO_NUISANCES, Nuisances, free_indices, with_values
-from auvsim.identification.segments import Problem, SegmentOptions, fit_segments
+from auvsim.identification.segment_problem import Problem
+from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
 from auvsim.identification.states import smoothed
 from estimators.planar_model import PARAMETER_NAMES, PRESTERO

@@ -1,0 +1,258 @@
+"""Records cut into segments, the sum of squares of their unknowns, and the way down it.
+
+Unknowns are the free parameters, the nuisances of each record and the first state of each segment. First states are
+eliminated segment by segment, so that the work grows linearly with the records.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Literal, NamedTuple
+
+import numpy as np
+
+from auvsim.errors import InputError
+from auvsim.identification import compiled
+from auvsim.identification.constraints import has_inertia, limits
+from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
+from auvsim.identification.records import Record
+from auvsim.identification.states import substeps
+from estimators.planar_model import PlanarParameters
+from estimators.types import Array
+
+Loss = Literal["squares", "huber", "cauchy"]
+LOSSES: tuple[Loss, ...] = ("squares", "huber", "cauchy")
+# Deviations about the smoothed state at which a segment's first state is held, so that one that a short segment does
+# not show stays where a vehicle can be; hundreds of times wider than what is measured.
+_FIRST = np.array([100.0, 100.0, 1.0, 1.0, 1.0, 1.0])
+_DAMPING = 1e-6  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class SegmentOptions:
+    """How segments are cut and weighed."""
+
+    length: float = 5.0  # of a segment [s]; infinite: each record is one
+    schedule: tuple[float, ...] = (1.0,)  # shorter ones that are fitted before [s]
+    nuisances: Nuisances = field(default_factory=Nuisances)
+    loss: Loss = "squares"
+    threshold: float = 2.5  # of a robust loss, in deviations
+    signs: bool = False  # keeps the parameters of constraints.SIGNS on their side of zero
+    prior: float | None = None  # weak prior: the start, with this relative deviation
+    max_iterations: int = 50
+    tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
+
+
+class _Cut(NamedTuple):
+    """A record in segments, as the compiled loops take it."""
+
+    record: Record
+    inputs: Array
+    measured: Array
+    weights: Array  # (8,)
+    bounds: Indices  # (s + 1,)
+    held: Array  # (s, 6) first states about which they are held
+
+
+class Point(NamedTuple):
+    """Unknowns and what the data say of them there."""
+
+    values: Array  # (k,) free parameters
+    nuisances: Array  # (records, 6)
+    starts: list[Array]  # of each record (s, 6)
+    cost: float
+    folds: list[tuple[Array, Array]]  # of each record: matrices and gradients of `segment_loops.fold`
+    residuals: list[Array]  # of each record (n, 8)
+
+
+class Problem:
+    """Records cut into segments of one length, and the sum of squares of their unknowns.
+
+    Args:
+        records: What was measured.
+        start: Where parameters start, and those that stay.
+        free: Names of the free ones.
+        options: How it is weighed.
+        length: Of a segment [s].
+        states: Of each record, (n, 12), round which first states lie.
+    """
+
+    def __init__(
+        self,
+        records: Sequence[Record],
+        start: PlanarParameters,
+        free: Sequence[str],
+        options: SegmentOptions,
+        length: float,
+        states: Sequence[Array],
+    ) -> None:
+        self.free, self.options, self.start = tuple(free), options, start
+        self.indices = free_indices(free)
+        self.low, self.high = limits(free, options.signs)
+        self._loops = compiled.segments()
+        self._vector = start.vector()
+        self.cuts = [_cut(record, length, x) for record, x in zip(records, states, strict=True)]
+        deviations = options.nuisances.vector()
+        self.active = np.array([active_nuisances(record, deviations) for record in records])  # (records, 6)
+        self._expected = np.zeros((len(records), 6))
+        for r, record in enumerate(records):
+            if record.current is not None:
+                self._expected[r, :2] = record.current
+        self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
+        self._prior = np.zeros(len(free))
+        if options.prior is not None:
+            reach = options.prior * np.abs(self._vector[self.indices])
+            self._prior = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+        self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
+        self.nuisances[:, 2:] = 0.0
+
+    def at(self, values: Array, nuisances: Array, starts: list[Array]) -> Point:
+        """Cost, matrices and gradients at some unknowns; the cost is infinite where a motion is not finite."""
+        p = self._vector.copy()
+        p[self.indices] = values
+        loss = LOSSES.index(self.options.loss)
+        cost = 0.5 * float(self._prior @ (values - self._vector[self.indices]) ** 2)
+        cost += 0.5 * float(np.sum(self._trust * (nuisances - self._expected) ** 2))
+        folds, residuals = [], []
+        if not has_inertia(with_values(self.start, self.free, values)):
+            cost = np.inf
+        for cut, own, first in zip(self.cuts, nuisances, starts, strict=True):
+            e = np.full(cut.measured.shape, np.nan)
+            step = cut.record.step
+            part, H, g = self._loops.fold(
+                first, cut.bounds, cut.inputs, cut.measured, cut.weights, p, self.indices, own, step, substeps(step),
+                loss, self.options.threshold, e,
+            )  # fmt: skip
+            away = cut.held - first
+            cost += part + 0.5 * float(np.sum((away / _FIRST) ** 2))
+            H[:, range(6), range(6)] += _FIRST**-2
+            g[:, :6] += away * _FIRST**-2
+            folds.append((H, g))
+            residuals.append(e)
+        return Point(values, nuisances, starts, cost, folds, residuals)
+
+    def reduced(self, point: Point, damping: float) -> tuple[Array, Array, list[Array]]:
+        """Equations (T, T) and (T,) of parameters, then active nuisances; and what brings back the first states.
+
+        Raises:
+            InputError: The first state of a segment cannot be eliminated.
+        """
+        k = len(self.free)
+        size = k + int(self.active.sum())
+        total, gradient, backs = np.zeros((size, size)), np.zeros(size), []
+        total[range(k), range(k)] += self._prior
+        gradient[:k] += self._prior * (self._vector[self.indices] - point.values)
+        for r, (H, g) in enumerate(point.folds):
+            part, descent, back, solved = self._loops.eliminate(H, g, damping)
+            if not solved:
+                raise InputError(f"record {self.cuts[r].record.name}: a segment does not show its first state")
+            places, here = self._places(r)
+            total[np.ix_(places, places)] += part[np.ix_(here, here)]
+            gradient[places] += descent[here]
+            own = places[k:]
+            total[own, own] += self._trust[r, self.active[r]]
+            gradient[own] += (self._trust[r] * (self._expected[r] - point.nuisances[r]))[self.active[r]]
+            backs.append(back)
+        return total, gradient, backs
+
+    def moved(self, point: Point, step: Array, backs: list[Array]) -> Point:
+        """The unknowns after a step (T,) of parameters and nuisances."""
+        k = len(self.free)
+        nuisances, starts = point.nuisances.copy(), []
+        for r, back in enumerate(backs):
+            places, here = self._places(r)
+            nuisances[r, self.active[r]] += step[places[k:]]
+            starts.append(point.starts[r] + back[:, :, -1] - back[:, :, here] @ step[places])
+        return self.at(point.values + step[:k], nuisances, starts)
+
+    def _places(self, r: int) -> tuple[Indices, Indices]:
+        """Places of a record's unknowns among all, and among those of its own equations."""
+        k = len(self.free)
+        before = k + int(self.active[:r].sum())
+        own = int(self.active[r].sum())
+        here = np.concatenate([np.arange(k), k + np.flatnonzero(self.active[r])])
+        return np.concatenate([np.arange(k), np.arange(before, before + own)]), here
+
+
+def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | None = None) -> tuple[Point, int, bool]:
+    """Levenberg and Marquardt's way down, on unknowns in units of their own curvature.
+
+    Args:
+        problem: Whose cost it is.
+        point: Where to begin.
+        tolerance: As that of `SegmentOptions`.
+        fixed: Which free parameters (k,) stay nevertheless; none if None.
+
+    Returns:
+        The lowest point, the iterations, and whether no step would lower the cost any more.
+    """
+    damping = _DAMPING
+    low, high = problem.low, problem.high
+    if fixed is not None:
+        low, high = np.where(fixed, point.values, low), np.where(fixed, point.values, high)
+    for iteration in range(1, problem.options.max_iterations + 1):
+        H, g, backs = problem.reduced(point, damping)
+        step = _solved(H, g, damping, low - point.values, high - point.values)
+        eliminated = sum(np.sum(g[:, :6] * back[:, :, -1]) for (_, g), back in zip(point.folds, backs, strict=True))
+        gain = 0.5 * float(g @ step + eliminated)
+        trial = problem.moved(point, step, backs)
+        last = gain < tolerance and damping <= 1e-3
+        if not trial.cost < point.cost:
+            if last or damping > 1e12:
+                return point, iteration, last
+            damping *= 10.0
+            continue
+        if last:
+            return trial, iteration, True
+        if point.cost - trial.cost > 0.5 * gain:
+            damping = max(0.1 * damping, 1e-12)
+        point = trial
+    return point, problem.options.max_iterations, False
+
+
+def _solved(H: Array, g: Array, damping: float, low: Array, high: Array) -> Array:
+    """The damped step of equations scaled to a unit diagonal, its parts kept between limits (k,) where there are.
+
+    What would cross its limit stops there, and the rest is solved again.
+    """
+    diagonal = np.diag(H).copy()
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    part = H / np.outer(scale, scale) + damping * np.eye(len(g))
+    low, high = (np.concatenate([side, np.full(len(g) - len(side), e)]) for side, e in ((low, -np.inf), (high, np.inf)))
+    step, loose = np.zeros(len(g)), diagonal > 0.0
+    while loose.any():
+        rest = g / scale - part @ np.where(loose, 0.0, step * scale)
+        step[loose] = np.linalg.lstsq(part[np.ix_(loose, loose)], rest[loose], rcond=1e-14)[0] / scale[loose]
+        crossing = loose & ((step < low) | (step > high))
+        if not crossing.any():
+            break
+        step[crossing] = np.clip(step, low, high)[crossing]
+        loose &= ~crossing
+    return step
+
+
+def _cut(record: Record, length: float, states: Array) -> _Cut:
+    samples = len(record.times)
+    size = samples if np.isinf(length) else min(samples, max(2, round(length / record.step)))
+    bounds = np.arange(0, samples, size)
+    if samples - bounds[-1] < max(2, size // 2):  # the rest goes to the last whole one
+        bounds = bounds[:-1] if len(bounds) > 1 else bounds
+    there = np.isfinite(record.measured).any(axis=0)
+    weights = np.where(there, 1.0 / np.where(there, record.deviations, 1.0), 0.0)
+    return _Cut(
+        record,
+        np.ascontiguousarray(record.inputs, dtype=float),
+        np.ascontiguousarray(record.measured, dtype=float),
+        weights,
+        np.append(bounds, samples),
+        states[bounds, :6].copy(),
+    )
+
+
+def active_nuisances(record: Record, deviations: Array) -> Mask:
+    """Which nuisances (6,) a record has: those that are believed possible and touch a channel that was measured."""
+    north, east, heading, surge, sway, rate, over_u, over_v = (
+        bool(np.isfinite(values).any()) for values in record.measured.T
+    )
+    log, ground = surge or sway or over_u or over_v, north or east or over_u or over_v
+    current = ground and record.current is None
+    return np.array([current, current, rate, heading, log, log]) & (deviations > 0.0)

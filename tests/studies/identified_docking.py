@@ -1,0 +1,182 @@
+"""The same docking trials with an estimator that believes the condensed, the identified, or a wrong planar model.
+
+From the checkout, after `auvsim identify LOG... --out model`:
+`python -m tests.studies.identified_docking model/parameters.yaml --trials 100 --seed 10`.
+
+Wrong by 20 %: every coefficient of drag, thrust, lift, cross-flow and rudder of the condensed model times 1.2 or 0.8,
+a fair draw for each, anew in each trial; masses and added masses stay.
+"""
+
+import argparse
+import math
+import multiprocessing
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+from rich.progress import Progress
+from rich.table import Table
+
+from auvsim import planar_sets, sampling, scenario
+from auvsim.condense import condense
+from auvsim.identification.fit import DEFAULT_FREE, with_values
+from auvsim.metrics import Summary, summarise
+from auvsim.randomness import stream
+from auvsim.trial import run_trial
+from estimators.planar_model import PlanarParameters
+
+MODELS = ("condensed", "identified", "wrong")
+WRONG = 0.2
+VEHICLE, SPEED = "remus100", 1.0  # at which the default trial condenses [m/s]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Ratio:
+    """Paired: the rms over all trials with one model by that with another."""
+
+    value: float
+    low: float  # 95 % interval, by drawing trials again
+    high: float
+
+
+def wrong(seed: int, trial: int) -> PlanarParameters:
+    """The condensed model, wrong by 20 %, of one trial."""
+    right = condense(VEHICLE, SPEED).parameters
+    signs = stream(seed, trial, "wrong model").choice([-1.0, 1.0], len(DEFAULT_FREE))
+    values = np.array([getattr(right, name) for name in DEFAULT_FREE])
+    return with_values(right, DEFAULT_FREE, values * (1.0 + WRONG * signs))
+
+
+def run_one(model: str, identified: Path, seed: int, trial: int) -> Summary:
+    """One trial: the same truth, start and noises whatever is believed.
+
+    Args:
+        model: Of MODELS.
+        identified: The file of the identified one.
+        seed: Of all random streams.
+        trial: Number of the trial under that seed.
+    """
+    with tempfile.TemporaryDirectory() as folder:
+        believed = planar_sets.CONDENSE
+        if model == "identified":
+            believed = str(identified)
+        elif model == "wrong":
+            believed = str(Path(folder) / "wrong.yaml")
+            planar_sets.write(_set(wrong(seed, trial)), Path(believed))
+        plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": believed}})
+        return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
+
+
+def _set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
+    return planar_sets.PlanarSet(
+        vehicle=VEHICLE, speed=SPEED, method="condensed, wrong by 20 %", start="-", version="-", sources=(),
+        parameters=planar_sets.coefficients(parameters, {}),
+    )  # fmt: skip
+
+
+def run_study(
+    identified: Path,
+    trials: int,
+    seed: int,
+    models: Sequence[str] = MODELS,
+    *,
+    workers: int | None = None,
+    progress: Callable[[int], None] | None = None,
+) -> dict[str, tuple[Summary, ...]]:
+    """The summaries of trials 0 .. trials-1 of a seed, by model.
+
+    Args:
+        identified: The file of the identified model.
+        trials: How many with each model.
+        seed: Of all of them.
+        models: Of MODELS.
+        workers: Processes; all cores if None.
+        progress: Called with the number of trials done.
+    """
+    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
+        futures = {
+            model: [pool.submit(run_one, model, identified, seed, trial) for trial in range(trials)] for model in models
+        }
+        for done, future in enumerate(as_completed([f for row in futures.values() for f in row]), start=1):
+            future.result()
+            if progress:
+                progress(done)
+        return {model: tuple(future.result() for future in row) for model, row in futures.items()}
+
+
+def squares(summaries: Sequence[Summary], phase: str = "all") -> np.ndarray:
+    """Of each trial the number of estimates and the sum of their squared position errors (n, 2) [1, m2]."""
+    found = [s.estimate.get(phase) for s in summaries]
+    rows = [(q.samples, q.samples * q.position_rms**2) if q and q.position_rms is not None else (0, 0.0) for q in found]
+    return np.array(rows, dtype=float).reshape(-1, 2)
+
+
+def rms(rows: np.ndarray) -> float:
+    """Over all estimates of trials, which weigh alike [m]."""
+    count, total = rows.sum(axis=0)
+    return math.sqrt(total / count) if count else math.nan
+
+
+def ratio(ours: Sequence[Summary], theirs: Sequence[Summary], phase: str = "all", draws: int = 2000) -> Ratio:
+    """Ratio of rms errors, with an interval by drawing trials again in pairs (Efron 1979)."""
+    a, b = squares(ours, phase), squares(theirs, phase)
+    generator = np.random.default_rng(0)
+    picks = generator.integers(0, len(a), (draws, len(a)))
+    drawn = [rms(a[pick]) / rms(b[pick]) for pick in picks]
+    low, high = np.percentile(drawn, (2.5, 97.5)).tolist()
+    return Ratio(value=rms(a) / rms(b), low=low, high=high)
+
+
+def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
+    """A row of each model, errors in all phases and in the last metres."""
+    count = max(map(len, study.values()), default=0)
+    result = Table(title=f"{count} docking trials, seed {seed}, the same for each model")
+    result.add_column("believed")
+    for heading in ("docked", "position rms [m]", "final rms [m]", "NEES", "identified by it", "final"):
+        result.add_column(heading, justify="right")
+    for model, summaries in study.items():
+        nees = [(q.samples, q.nees_per_dof) for s in summaries if (q := s.estimate["all"]).nees_per_dof is not None]
+        weight = sum(n for n, _ in nees)
+        cells = [
+            str(sum(s.docked for s in summaries)),
+            f"{rms(squares(summaries)):.3f}",
+            f"{rms(squares(summaries, 'final')):.3f}",
+            f"{sum(n * value for n, value in nees) / weight:.2f}" if weight else "-",
+        ]
+        for phase in ("all", "final"):
+            if model == "identified" or "identified" not in study or not summaries:
+                cells.append("")
+                continue
+            r = ratio(study["identified"], summaries, phase)
+            cells.append(f"{r.value:.3f} ({r.low:.3f}-{r.high:.3f})")
+        result.add_row(model, *cells)
+    return result
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command; `arguments` are those of the command line if None."""
+    parser = argparse.ArgumentParser(description="The same docking trials with each planar model believed.")
+    parser.add_argument("identified", type=Path, help="parameters.yaml of auvsim identify")
+    parser.add_argument("--trials", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=10)
+    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
+    options = parser.parse_args(arguments)
+    planar_sets.load(str(options.identified), VEHICLE)
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("trials", total=options.trials * len(MODELS))
+        study = run_study(
+            options.identified,
+            options.trials,
+            options.seed,
+            workers=options.workers,
+            progress=lambda done: bar.update(task, completed=done),
+        )
+    Console(width=None if Console().is_terminal else 130).print(table(study, options.seed))
+
+
+if __name__ == "__main__":
+    main()
