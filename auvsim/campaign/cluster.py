@@ -137,7 +137,7 @@ def _lost(what: str) -> AuvsimError:
 
 def _hush() -> None:
     """Keeps Dask's log off the terminal: what matters it tells by exceptions, the rest is pages of tracebacks."""
-    for name in logging.root.manager.loggerDict:
+    for name in list(logging.root.manager.loggerDict):
         if name.partition(".")[0] == "distributed":
             logging.getLogger(name).handlers.clear()
     logger = logging.getLogger("distributed")
