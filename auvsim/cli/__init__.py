@@ -120,8 +120,9 @@ class Reproduce:
     """Folder of the tables and pictures."""
     jobs: int | None = None
     """Processes; by default one for each core."""
-    truth: Literal["planar", "mujoco", "both"] = "both"
-    """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each."""
+    truth: Literal["planar", "mujoco", "both"] | None = None
+    """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each; by
+    default both, and in --quick planar."""
 
 
 @dataclass(frozen=True, kw_only=True)

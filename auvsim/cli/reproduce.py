@@ -26,8 +26,8 @@ LEGEND = (
 )
 
 
-def run(*, quick: bool, seed: int, out: Path, jobs: int | None, truth: str = "both") -> int:
-    """Runs the study on the planar model's truth, on MuJoCo's ("mujoco") or on both, prints it and fills the folder.
+def run(*, quick: bool, seed: int, out: Path, jobs: int | None, truth: str | None = None) -> int:
+    """Runs the study on the truth asked for, or of both, only the planar one if quick; prints it and fills the folder.
 
     Returns:
         The exit code.
@@ -39,6 +39,7 @@ def run(*, quick: bool, seed: int, out: Path, jobs: int | None, truth: str = "bo
         raise InputError(f"command line: --seed {seed} must be 0 or more")
     if jobs is not None and jobs < 1:
         raise InputError(f"command line: --jobs {jobs} must be 1 or more; leave it out for all cores")
+    truth = truth or ("planar" if quick else "both")
     planar = mujoco = None
     with output_folder(out):
         if truth != "mujoco":
@@ -120,14 +121,14 @@ def truths_table(planar: paper1.Study, mujoco: MujocoStudy) -> Table:
     """One line for each row: ratios, with half their 95 % intervals, and NEES on the planar truth and on MuJoCo's."""
     table = Table(title="paper 1: planar truth and MuJoCo's", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     table.add_column("row", no_wrap=True)
-    names = [SHORT[key].replace("+ ", "+") for key in DRAWN]
+    names = [SHORT[key] for key in DRAWN]
     for quantity in ("paper [m]", *(f"{name} / paper" for name in names), *(f"NEES {name}" for name in names)):
         for truth in ("planar", "MuJoCo"):
             table.add_column(f"{quantity}, {truth}", justify="right", min_width=9)
     for name, both in paper1_truths.beside(planar, mujoco):
         cells = [f"{r[paired.REFERENCE].rms:.3f}" if r else "-" for r in both]
         for key in DRAWN:
-            cells += [f"{r[key].ratio:.2f}±{1.96 * r[key].ratio_deviation:.2f}" if r else "-" for r in both]
+            cells += [_ratio(r[key]) if r else "-" for r in both]
         for key in DRAWN:
             cells += [_number(r[key].nees) if r else "-" for r in both]
         table.add_row(paper1_truths.title(name), *cells)
@@ -166,6 +167,12 @@ def table1(study: paper1.Study) -> Table:
 
 def _nees(results: Mapping[str, Result], key: str) -> float:
     return paper1_products.claimed_nees(key, results[key])
+
+
+def _ratio(result: Result) -> str:
+    """With half its 95 % interval, unless it is that of a single run."""
+    deviation = result.ratio_deviation
+    return f"{result.ratio:.2f}" + ("" if math.isnan(deviation) else f"±{1.96 * deviation:.2f}")
 
 
 def _number(value: float) -> str:

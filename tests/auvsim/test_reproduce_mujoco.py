@@ -220,6 +220,23 @@ def test_the_command_runs_the_truth_asked_for(study, tmp_path, monkeypatch, caps
     assert ran == ["mujoco"]
 
 
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        ([], ["planar", "mujoco"]),
+        (["--quick"], ["planar"]),
+        (["--quick", "--truth", "both"], ["planar", "mujoco"]),
+        (["--truth", "planar"], ["planar"]),
+    ],
+)
+def test_a_quick_look_leaves_mujoco_out(arguments, expected, tmp_path, monkeypatch):
+    ran = []
+    monkeypatch.setattr(paper1, "reproduce", lambda *_, **__: ran.append("planar"))
+    monkeypatch.setattr(paper1_mujoco, "reproduce", lambda *_, **__: ran.append("mujoco"))
+    assert cli.main(["reproduce", "paper1", *arguments, "--out", str(tmp_path)]) == 0
+    assert ran == expected
+
+
 def test_the_printed_table_sets_both_truths_side_by_side(study, planar, capsys):
     from auvsim.cli import reproduce as command
 
