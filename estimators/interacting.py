@@ -5,9 +5,8 @@ from dataclasses import replace
 from typing import NamedTuple, Unpack
 
 import numpy as np
-from scipy.linalg import expm
 
-from estimators import ekf, imm, outliers, recovery
+from estimators import ekf, imm, loops, outliers, recovery
 from estimators.ekf import Innovation
 from estimators.errors import ParameterError
 from estimators.history import Input, Node
@@ -131,7 +130,7 @@ class InteractingFilter:
             rejected = (*state.rejected, now)
             count += 1
         accepted = state.accepted + (not rejected)
-        transition = np.asarray(expm(max(SHORTEST, fix.stamp - state.last_fix) * self._generator), dtype=float)
+        transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
         beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)
         return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation)
 

@@ -4,10 +4,11 @@ import math
 
 import numpy as np
 import pytest
+from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 from test_ekf import belief, measurement
 
-from estimators import ekf, imm, outliers
+from estimators import ekf, imm, loops, outliers
 from estimators.errors import ParameterError
 from estimators.outliers import Outliers
 from estimators.planar_filter import PositionModel
@@ -30,6 +31,17 @@ def test_merged_moments_are_those_of_the_mixture():
     merged = imm.merge(beliefs, WEIGHTS)
     assert merged.mean == pytest.approx(mean, abs=1e-12)
     assert merged.covariance == pytest.approx(covariance, rel=1e-12, abs=1e-12)
+
+
+@pytest.mark.parametrize("duration", [0.0, 0.1, 5.0, 300.0, 1e5])
+@pytest.mark.parametrize("modes", [2, 3, 4])
+def test_changes_of_mode_are_the_exponential_of_their_rates(modes, duration):
+    generator = np.random.default_rng(modes).uniform(0.0, 0.02, (modes, modes))
+    np.fill_diagonal(generator, 0.0)
+    np.fill_diagonal(generator, -generator.sum(axis=1))
+    found = loops.transition(generator, duration)
+    assert found == pytest.approx(expm(duration * generator), abs=1e-11)  # rounding, doubled by each squaring
+    assert (found >= 0.0).all()
 
 
 def test_mixing_follows_bayes_rule():
