@@ -56,6 +56,18 @@ class Estimate:
     initialised: bool  # false until position is known
     refused: int = 0  # readings refused so far
     reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
+    reinitialised: int = 0  # how often it had to start anew, because its numbers were no longer finite
+
+
+def mishaps(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:
+    """Kinds and texts of the events between two estimates: readings refused, by reason, and starts anew."""
+    known, told = before.reasons if before else {}, []
+    for reason, count in now.reasons.items():
+        if (more := count - known.get(reason, 0)) > 0:
+            told.append(("refused", f"{more} measurement{'s' * (more > 1)}: {reason.replace('_', ' ')}"))
+    if now.reinitialised > (before.reinitialised if before else 0):
+        told.append(("reinitialised", "the estimator started anew: its numbers were no longer finite"))
+    return told
 
 
 class Navigator(Protocol):
@@ -79,20 +91,20 @@ class EstimatorSettings(Settings):
         "package.module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="compass noise it believes, each reading [deg]")
-    position_noise: float = Field(default=4e-4, ge=0, description="process noise of position [m2/s]")
+    position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
     heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
     velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
     yaw_rate_noise: float = Field(default=1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
     current_noise: float = Field(
-        default=1e-5, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
+        default=3e-6, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
     )
     steady_noise: float = Field(
         default=1e-6, ge=0, description="random walk of the current in the steady modes of the imm [m2/s3]"
     )
     turning_noise: float = Field(
-        default=0.04, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
+        default=0.02, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
     )
-    turn_interval: float = Field(default=1000.0, gt=0, description="mean time between turns the imm expects [s]")
+    turn_interval: float = Field(default=300.0, gt=0, description="mean time between turns the imm expects [s]")
     compass_bias_deg: float = Field(
         default=0.5, ge=0, description="constant error of the vehicle's compass that the imm estimates [deg]"
     )
@@ -165,6 +177,7 @@ class DockingNavigator:
             initialised=result.initialised,
             refused=sum(result.refused.values()),
             reasons=result.refused,
+            reinitialised=result.reinitialised,
         )
 
     def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:

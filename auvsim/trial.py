@@ -173,6 +173,8 @@ class Loop:
     def _navigate(self) -> None:
         e = self.navigator.update(self.time, self._since_update, self._commands)
         self._since_update = []
+        for mishap in navigation.mishaps(self._estimate, e):
+            self.log.event(self.time, *mishap)
         self._estimate = e
         self.log.append(
             "estimate",

@@ -108,10 +108,14 @@ def mujoco_table(study: MujocoStudy) -> Table:
     table.add_column("row", no_wrap=True)
     others = [key for key in next(iter(study.results.values())) if key != paired.REFERENCE]
     judged = [key for key in paper1_products.DOTS if key in others]
-    for heading in ("runs", "paper [m]", *(SHORT[key] for key in others), *(f"NEES {SHORT[key]}" for key in judged)):
+    bounded = [key for key in (paired.REFERENCE, "imm_biases") if key == paired.REFERENCE or key in others]
+    headings = [SHORT[key] for key in others] + [f"NEES {SHORT[key]}" for key in judged]
+    for heading in ("runs", "paper [m]", *headings, *(f"{SHORT[key]} / bound" for key in bounded)):
         table.add_column(heading, justify="right")
     for name, results in study.results.items():
+        bound = study.bounds.get(name, math.nan)
         numbers = [results[key].ratio for key in others] + [_nees(results, key) for key in judged]
+        numbers += [results[key].rms / bound for key in bounded]
         rms = f"{results[paired.REFERENCE].rms:.3f}"
         table.add_row(paper1_mujoco.ROWS[name].title, str(study.runs[name]), rms, *map(_number, numbers))
     return table

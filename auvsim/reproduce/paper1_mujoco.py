@@ -4,16 +4,22 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
+
+import numpy as np
 
 from auvsim import navigation
 from auvsim.navigation import Navigator
-from auvsim.reproduce.paired import Progress, results, run_tasks, score_tasks, scores
+from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks, score_tasks, scores
 from auvsim.reproduce.paper1_mujoco_runs import Recording, Voyage, simulate, track
 from auvsim.reproduce.paper1_runs import TICK
 from auvsim.reproduce.paper1_study import AFTER, FILTERS, Result, Row, Score
 from auvsim.scenario import Scenario
+from estimators.bounds import PosteriorBound
 from estimators.docking import PAPER_NOISE, PaperFilter
+from estimators.planar_filter import COMPASS, USBL, DockingNoise, PlanarModels
 from estimators.planar_model import PlanarParameters
+from estimators.types import Array
 
 # Settled rows are many short runs, because what errs there most, the compasses, errs alike throughout a run.
 SETTLED, STEADY, TURN = Voyage(duration=400.0), Voyage(), Voyage(turn=(120.0, 130.0))
@@ -95,6 +101,7 @@ class MujocoStudy:
     quick: bool
     runs: Mapping[str, int]  # by row
     results: Mapping[str, Mapping[str, Result]]  # by row and filter
+    bounds: Mapping[str, float]  # rms [m] of the posterior Cramér-Rao bound, by settled row
 
 
 def reproduce(
@@ -122,14 +129,59 @@ def reproduce(
     counts = {name: count for name, count in counts.items() if count}
     filters = filters or (QUICK_FILTERS if quick else tuple(NAVIGATORS))
     tasks = score_tasks(ROWS, counts, seed, partial(_scores, tuple(filters)))
+    bounded = [(name, k) for name in counts if name.startswith("settled") for k in range(counts[name])]
+    for name, k in bounded:
+        work = partial(bound, ROWS[name], run_seed(seed, k))
+        tasks.append(Task(key=("bound", name, k), work=work, weight=ROWS[name].conditions.duration / len(filters)))
     done = run_tasks(tasks, jobs, progress)
-    return MujocoStudy(seed=seed, quick=quick, runs=counts, results=results(done, ROWS, counts))
+    bounds = {name: math.sqrt(np.mean([done["bound", name, k] for k in range(counts[name])])) for name in dict(bounded)}
+    return MujocoStudy(seed=seed, quick=quick, runs=counts, results=results(done, ROWS, counts), bounds=bounds)
 
 
 def _scores(filters: Sequence[str], rows: Mapping[str, Row], seed: int) -> dict[str, dict[str, Score]]:
     """The scores of filters in one run, through the window of each row."""
     run = simulate(next(iter(rows.values())).conditions, seed)
     return scores(rows, run, {key: track(run, navigator(key, run)) for key in filters})
+
+
+_UNCERTAIN = 0.01  # of the process noise that filters believe in: MuJoCo's vehicle has none, its model errs a little
+
+
+def bound(row: Row[Voyage], seed: int) -> float:
+    """Mean square [m^2] of the posterior Cramér-Rao bound of the position in a row without turn or mishaps.
+
+    That of a filter which knows the vehicle but for a hundredth of the process noise that the others believe, the
+    current to be constant, and of the two compasses' errors how large they are in the mean.
+    """
+    run = simulate(row.conditions, seed)
+    made = navigator("imm_biases", run)
+    estimator = made._estimator
+    noise = _nearly_certain(estimator._filter.noise)
+    models = PlanarModels(run.parameters, noise)
+    columns = [*run.states.T, *np.zeros((len(noise.biases), len(run.times)))]
+    columns[2] = np.unwrap(columns[2])
+
+    def truths(time: float) -> Array:
+        return np.array([[np.interp(time, run.times, column) for column in columns]])
+
+    def first(nodes: Sequence[Any], index: int) -> Array | None:
+        start = models.first(nodes, index)
+        return None if start is None else start[0].covariance
+
+    sensors = {COMPASS: models.heading, USBL: models.position}
+    estimator._filter = PosteriorBound(models.process, sensors, truths, first, noise)
+    estimator.reset()
+    followed = track(run, made)
+    begin, end = row.window
+    counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])
+    return float(np.trace(followed.covariances[counted, :2, :2], axis1=1, axis2=2).mean())
+
+
+def _nearly_certain(noise: DockingNoise) -> DockingNoise:
+    # Constant errors walk a millionth of their variance a second, since the bound needs noise on every state.
+    biases = {k: replace(b, density=1e-6 * b.deviation**2) for k, b in noise.biases.items() if k != "surge"}
+    names = ("position", "heading", "surge", "sway", "yaw_rate")
+    return replace(noise, current=1e-8, biases=biases, **{k: _UNCERTAIN * getattr(noise, k) for k in names})
 
 
 def navigator(key: str, run: Recording) -> Navigator:

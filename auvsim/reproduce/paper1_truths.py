@@ -1,5 +1,6 @@
 """Paper 1's study on two truths, the planar model's and MuJoCo's: tables and a picture of one beside the other."""
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -36,14 +37,15 @@ def study_rows(study: MujocoStudy) -> Iterable[Sequence[Any]]:
     """Heading and lines of study_mujoco.csv: one for each row and filter."""
     yield (
         "row", "title", "filter", "runs", "rms_m", "mean_m", "maximum_m", "mean_peak_m", "worst_run_rms_m",
-        "nees_per_dof", "state_nees_per_dof", "ratio", "ratio_low", "ratio_high",
+        "nees_per_dof", "state_nees_per_dof", "ratio", "ratio_low", "ratio_high", "bound_m", "ratio_to_bound",
     )  # fmt: skip
     for name, results in study.results.items():
+        bound = study.bounds.get(name, math.nan)
         for key, result in results.items():
             yield (
                 name, paper1_mujoco.ROWS[name].title, key, study.runs[name], result.rms, result.mean, result.maximum,
                 result.peak, result.worst_rms, claimed_nees(key, result), result.state_nees, result.ratio,
-                *interval(result),
+                *interval(result), bound, result.rms / bound,
             )  # fmt: skip
 
 

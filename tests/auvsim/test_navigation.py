@@ -56,7 +56,9 @@ class Recorder:
         """Keeps its arguments."""
         self.ticks.append(SimpleNamespace(time=time, heading=heading, rudder=rudder, shaft=shaft_speed, fixes=fixes))
         refused = {"outlier": 2, "duplicate": 1}
-        return SimpleNamespace(mean=self._mean, covariance=np.eye(8), initialised=True, refused=refused)
+        return SimpleNamespace(
+            mean=self._mean, covariance=np.eye(8), initialised=True, refused=refused, reinitialised=0
+        )
 
 
 def recording(yaw_rate: float = 0.0) -> tuple[DockingNavigator, Recorder]:
@@ -354,3 +356,9 @@ def test_what_is_refused_is_counted_by_reason() -> None:
     assert counts.refused == 5
     reasons = {reason: count for reason, count in counts.reasons.items() if count}
     assert reasons == {"duplicate": 1, "future": 1, "not_finite": 1, "outlier": 1, "too_old": 1}
+    told = navigation.mishaps(last, counts)
+    assert {kind for kind, _ in told} == {"refused"}
+    assert {text for _, text in told} == {f"1 measurement: {reason.replace('_', ' ')}" for reason in reasons}
+    assert navigation.mishaps(counts, counts) == []
+    anew = navigation.mishaps(counts, replace(counts, reinitialised=1))
+    assert [kind for kind, _ in anew] == ["reinitialised"]

@@ -13,7 +13,7 @@ from auvsim import cli
 from auvsim.condense import condense
 from auvsim.navigation import augmented_ekf
 from auvsim.reproduce import paired, paper1, paper1_mujoco, paper1_study, paper1_truths
-from auvsim.reproduce.paper1_mujoco import NAVIGATORS, ROWS, navigator
+from auvsim.reproduce.paper1_mujoco import NAVIGATORS, ROWS, bound, navigator
 from auvsim.reproduce.paper1_mujoco_runs import REACHED, SPEED, Voyage, simulate, track
 from auvsim.reproduce.paper1_products import DOTS
 from estimators.planar_filter import REFERENCE_NOISE
@@ -145,6 +145,21 @@ def test_the_study_is_that_of_paired_runs(study):
     assert study.results["start"]["imm_biases"].ratio == pytest.approx(ratio, rel=1e-12)  # sums in another order
     assert study.results["start"]["paper"].rms == pytest.approx(math.sqrt(squares["paper"] / RUNS), rel=1e-12)
     assert 0.1 < ratio < 1.0  # in the first minute eq. 11 does not know the current yet
+
+
+def test_the_bound_is_what_the_compasses_leave():
+    """At 200 m, with neither process noise nor anything to tell the dock's compass error by, that error is it.
+
+    The vehicle's compass, which errs more itself, tells a little of it: so the bound lies somewhat below.
+    """
+    row = replace(ROWS["settled_200"], conditions=replace(ROWS["settled_200"].conditions, duration=150.0))
+    rms = math.sqrt(bound(row, 3))
+    run = simulate(row.conditions, 3)
+    mean_range = math.sqrt(np.mean(np.sum(run.states[run.times >= 100.0, :2] ** 2, axis=1)))
+    alone = math.radians(0.3) * mean_range
+    assert 0.8 * alone < rms < 1.1 * alone
+    small = replace(row, conditions=replace(row.conditions, usbl={"noise": ((100.0, 0.01),)}))
+    assert bound(small, 3) < 0.99 * bound(row, 3)  # better fixes leave less: the compass error, and 0.1 m of 1 m at most
 
 
 def test_rows_are_those_of_the_planar_study_and_the_approach():

@@ -235,6 +235,25 @@ def test_diverged_keeps_the_log_up_to_there() -> None:
     assert metrics.summarise(trial).failure_reason == "diverged"
 
 
+def test_what_the_estimator_refuses_is_named_in_the_log() -> None:
+    """Packets that arrive twice, and outliers: an event for each, with its reason, as many as it counts."""
+    often = {"usbl": {"outlier_probability": 0.3}}
+    trial = run(5, duration=150.0, sensors=often, acoustics={"duplicate_probability": 0.5})
+    texts = [text for kind, text in events(trial) if kind == "refused"]
+    counts = dict.fromkeys(("duplicate", "outlier"), 0)
+    for text in texts:
+        number, _, reason = text.partition(" ")
+        counts[reason.split(": ")[1]] += int(number)
+    assert min(counts.values()) > 0
+    # An outlier that is taken after all, because others agree with it, is counted back.
+    assert sum(counts.values()) >= trial["estimate"]["refused"][-1]
+    rises = np.flatnonzero(np.diff(trial["estimate"]["refused"], prepend=0) > 0)
+    told = {
+        time for time, kind in zip(trial["event"]["time"], trial["event"]["kind"], strict=True) if kind == "refused"
+    }
+    assert set(trial["estimate"]["time"][rises]) <= told
+
+
 def test_control_waits_for_the_first_readings() -> None:
     """With a depth gauge at 1 Hz nothing is commanded in the first second, and the trial goes on as started."""
     trial = run(4, duration=10.0, sensors={"depth": {"rate": 1.0}})
@@ -258,7 +277,8 @@ def test_other_rates() -> None:
 
 def test_docked_is_docked(docked: TrialLog) -> None:
     """The whole of a good trial: its phases, the latch, and what follows it."""
-    assert [kind for kind, _ in events(docked)] == ["homing", "approach", "final", "docked"]
+    phases = [kind for kind, _ in events(docked) if kind != "refused"]
+    assert phases == ["homing", "approach", "final", "docked"]
     assert all(text for _, text in events(docked))
     phases = docked["guidance"]["phase"]
     assert [int(phase) for phase, _, _ in metrics.phase_stretches(phases)] == [0, 1, 2, 3, 4]
