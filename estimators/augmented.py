@@ -13,8 +13,6 @@ from estimators.planar_model import PlanarParameters, PlanarProcess
 from estimators.recovery import Rejected
 from estimators.types import Gaussian, Measurement
 
-PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
-
 Transform = Literal["extended", "unscented"]
 TRANSFORMS = {"extended": ekf, "unscented": ukf}
 
@@ -104,7 +102,7 @@ class AugmentedFilter:
     def _fuse_fix(self, state: AugmentedState, fix: Measurement) -> AugmentedState:
         position = self.models.position
         belief, innovation = self._kalman.correct(state.belief, fix, position, self._gate)
-        if innovation.accepted and (not state.rejected or innovation.nis <= chi_square(PROBABLE, 2)):
+        if innovation.accepted and (not state.rejected or innovation.nis <= chi_square(recovery.PROBABLE, 2)):
             return AugmentedState(belief, state.outliers, (), innovation)
         now = Rejected(fix.stamp, innovation.residual, position.jacobian(state.belief.mean), fix.covariance)
         for earlier in recovery.agreeing(now, state.rejected, self.noise)[:1]:

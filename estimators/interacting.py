@@ -7,6 +7,7 @@ from typing import NamedTuple, Unpack
 import numpy as np
 
 from estimators import ekf, imm, loops, outliers, recovery
+from estimators.consistency import chi_square
 from estimators.ekf import Innovation
 from estimators.errors import ParameterError
 from estimators.history import Input, Node
@@ -118,17 +119,19 @@ class InteractingFilter:
         innovation = modes[int(weights.argmax())].innovation
         rejected: tuple[Rejected, ...] = ()
         count = state.outliers
-        if sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5:
+        is_wrong = bool(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5)
+        # A fix that the filter would take, but only just, may as well confirm one that it did not take.
+        if is_wrong or (state.rejected and innovation.nis > chi_square(recovery.PROBABLE, 2)):
             now = self._rejected(state, fix, modes)
             agreeing = recovery.agreeing(now, state.rejected, self.noise)
             needed = 1 if state.accepted < TRUSTED else 2
-            if len(agreeing) >= needed or len(state.rejected) >= recovery.REMEMBERED:
+            if len(agreeing) >= needed or (is_wrong and len(state.rejected) >= recovery.REMEMBERED):
                 earlier = agreeing[0] if agreeing else state.rejected[-1]
                 recovered = recovery.recover(state.belief, earlier, now, self.noise)
                 beliefs = (recovered,) * len(modes)
                 return InteractingState(beliefs, self._initial, fix.stamp, 2, count - len(agreeing), (), innovation)
-            rejected = (*state.rejected, now)
-            count += 1
+            rejected = (*state.rejected, now) if is_wrong else ()
+            count += is_wrong
         accepted = state.accepted + (not rejected)
         transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
         beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)

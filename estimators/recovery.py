@@ -10,6 +10,7 @@ from estimators.planar_filter import DockingNoise
 from estimators.types import Array, Gaussian
 
 REMEMBERED = 4  # rejected fixes that are kept; the next one then is taken in any case
+PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
 AGREEMENT = 0.99  # probability with which two good fixes are found to agree
 FORGOTTEN = 30.0  # age at which a rejected fix says nothing more of the present [s]
 
