@@ -154,7 +154,7 @@ def bound(row: Row[Voyage], seed: int) -> float:
     current to be constant, and of the two compasses' errors how large they are in the mean.
     """
     run = simulate(row.conditions, seed)
-    made = navigator("imm_biases", run)
+    made = navigator("imm", run)
     estimator = made._estimator
     noise = _nearly_certain(estimator._filter.noise)
     models = PlanarModels(run.parameters, noise)
@@ -179,7 +179,7 @@ def bound(row: Row[Voyage], seed: int) -> float:
 
 def _nearly_certain(noise: DockingNoise) -> DockingNoise:
     # Constant errors walk a millionth of their variance a second, since the bound needs noise on every state.
-    biases = {k: replace(b, density=1e-6 * b.deviation**2) for k, b in noise.biases.items() if k != "surge"}
+    biases = {k: replace(b, density=1e-6 * b.deviation**2) for k, b in noise.biases.items()}
     names = ("position", "heading", "surge", "sway", "yaw_rate")
     return replace(noise, current=1e-8, biases=biases, **{k: _UNCERTAIN * getattr(noise, k) for k in names})
 
