@@ -109,10 +109,10 @@ def mujoco_table(study: MujocoStudy) -> Table:
     others = [key for key in next(iter(study.results.values())) if key != paired.REFERENCE]
     judged = [key for key in paper1_products.DOTS if key in others]
     bounded = [key for key in (paired.REFERENCE, "imm_biases") if key == paired.REFERENCE or key in others]
-    brief = {key: SHORT[key].split()[0] for key in FILTERS}
-    headings = [SHORT[key] for key in others] + [f"NEES {brief[key]}" for key in judged]
+    brief = {key: SHORT[key].removesuffix(" biases") for key in FILTERS}
+    headings = [brief[key] for key in others] + [f"NEES {brief[key]}" for key in judged]
     for heading in ("runs", "paper [m]", *headings, *(f"{brief[key]} / bound" for key in bounded)):
-        table.add_column(heading, justify="right")
+        table.add_column(heading, justify="right", min_width=max(map(len, heading.split())))
     for name, results in study.results.items():
         bound = study.bounds.get(name, math.nan)
         numbers = [results[key].ratio for key in others] + [_nees(results, key) for key in judged]
