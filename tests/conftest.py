@@ -6,7 +6,7 @@ if "PYTEST_XDIST_WORKER" in os.environ:  # processes that share the cores: threa
     for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(name, "1")
 
-import auvsim  # noqa: E402, F401
+import auvsim  # noqa: F401
 
 LONGEST = ("test_notebooks.py", "test_wheel.py")
 
