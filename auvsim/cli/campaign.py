@@ -72,9 +72,9 @@ def report(path: Path) -> int:
     """Writes tables and report of what is finished of a campaign, and prints the rates.
 
     Raises:
-        InputError: If there is no campaign.
+        InputError: If there is no campaign, or no trial of it is done.
     """
-    done = folder.open_folder(path)
+    done = folder.open_begun(path)
     table.write(done)
     _report(done)
     return 0
