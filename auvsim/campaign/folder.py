@@ -36,6 +36,10 @@ class Folder:
         """Where its log is, if the plan keeps it."""
         return self.path / "logs" / variant / f"{trial:06d}.nc"
 
+    def replay_path(self, variant: str, trial: int) -> Path:
+        """The folder of a trial that was run again with `replay_command`."""
+        return self.path / "replays" / f"{variant}-{trial}"
+
     def replay_command(self, variant: str, trial: int) -> str:
         """What runs one trial again, alone and with a video."""
         only = f" --variant {variant}" if len(self.plan.variants) > 1 else ""

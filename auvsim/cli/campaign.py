@@ -61,8 +61,8 @@ def replay(name: str, trial: int, *, variant: str | None, out: Path | None, vide
     if variant not in chosen.variants:
         raise unknown_name("variant", variant, list(chosen.variants))
     parsed = scenario.parse(chosen.values(variant, trial))
-    what = f"{variant}-{trial}"
-    path = out or (Path(name, "replays", what) if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{what}")
+    here = Folder(Path(name), chosen).replay_path(variant, trial)
+    path = out or (here if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{variant}-{trial}")
     code = dock.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
     print(f"written: {path}", file=sys.stderr)
     return code

@@ -121,7 +121,8 @@ def _ruler(cells: Cells) -> list[Markup]:
         parts.append(tag("line", x1=x, x2=x, y1=y, y2=y + 4.0, class_="zero"))
         if (rings - ring) % every == 0:
             parts.append(tag("text", f"{edge:g}", x=x, y=y + 16.0, text_anchor="middle"))
-    return [*parts, tag("text", "m/s", x=middle + RADIUS + 14.0, y=y + 16.0)]
+    beside = middle + RADIUS + LETTER * (len(f"{cells.edges[-1]:g}") / 2.0 + 1.0)
+    return [*parts, tag("text", "m/s", x=beside, y=y + 16.0)]
 
 
 def _radius(cells: Cells, ring: int) -> float:

@@ -90,7 +90,7 @@ def test_parquet_and_csv_hold_the_rows(done: Folder) -> None:
     assert all(0.0 < float(each["cpu_time"]) < math.inf for each in times)
 
 
-ONLY_HERE = ("wall_time", "real_time_factor", "command", "log")
+ONLY_HERE = ("wall_time", "cpu_time", "real_time_factor", "command", "log", "replay")
 
 
 def test_dask_gives_the_same_table(done: Folder, tmp_path: Path) -> None:
@@ -111,6 +111,8 @@ def test_one_trial_again(
     again = done.path / "replays" / "plain-1"
     assert log.differences(log.read(again / "trial.nc"), log.read(done.log_path("plain", 1))) == []
     assert {path.name for path in again.iterdir()} == {"trial.nc", "summary.json"}
+    replays = {(row["variant"], row["trial"]): row["replay"] for row in table.rows(done)}
+    assert {place: path for place, path in replays.items() if path} == {("plain", 1): "replays/plain-1/trial.nc"}
     capsys.readouterr()
     for arguments, text in (
         (["--trial", "1"], "command line: --trial needs --variant; there are plain, raises"),
