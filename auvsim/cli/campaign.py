@@ -39,7 +39,9 @@ def run(
         with start as pool, CampaignProgress(chosen.settings.name) as progress:
             done = execution.run(chosen, path, pool, progress)
     except KeyboardInterrupt:
-        print(f"auvsim: interrupted; what is finished is kept, `auvsim campaign {path}` goes on", file=sys.stderr)
+        begun = (path / folder.PLAN).is_file()
+        more = f"; what is finished is kept, `auvsim campaign {path}` goes on" if begun else ", before it began"
+        print(f"auvsim: interrupted{more}", file=sys.stderr)
         return 130
     _report(done)
     return 0
