@@ -121,6 +121,14 @@ def test_the_map_counts_what_docked(text: str) -> None:
         assert sums.tolist() == [2 * sum(r["docked"] for r in mine), 2 * TRIALS, 2 * first], index  # two frames
 
 
+def test_the_map_shows_first_what_tells_currents_apart(text: str) -> None:
+    """Success where some failed; where all docked, the first attempt."""
+    assert 'data-measure="docked"' in text
+    docked = page(content(rows=[{**r, "docked": True} for r in rows()]))
+    assert 'data-measure="first"' in docked
+    assert docked.index('<option value="first">') < docked.index('<option value="docked">')
+
+
 def test_the_curve_of_misses_is_the_share_of_all_trials() -> None:
     """Where the curve ends, and where it passes the median, by counting."""
     text = misses.section(content())
