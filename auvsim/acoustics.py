@@ -2,7 +2,7 @@
 
 import heapq
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from numpy.random import Generator
 from pydantic import Field, model_validator
@@ -58,14 +58,14 @@ class Channel:
         drop, jitter, late, twice, gap = self._noise.uniforms(5)
         stamp = reading.stamp + settings.clock_offset
         if lost or drop < settings.dropout_probability:
-            return Packet(reading=replace(reading, stamp=stamp, received=math.nan), lost=True)
+            return Packet(reading=reading._replace(stamp=stamp, received=math.nan), lost=True)
         delay = settings.delay + settings.per_metre * slant_range + settings.jitter * (2.0 * jitter - 1.0)
         if late < settings.late_probability:
             delay += settings.late_delay
-        sent = replace(reading, stamp=stamp, received=reading.stamp + delay)
+        sent = reading._replace(stamp=stamp, received=reading.stamp + delay)
         self._push(sent)
         if twice < settings.duplicate_probability:  # the copy follows within one late_delay
-            self._push(replace(sent, received=sent.received + gap * settings.late_delay))
+            self._push(sent._replace(received=sent.received + gap * settings.late_delay))
         return Packet(reading=sent, lost=False)
 
     def receive(self, now: float) -> list[Reading]:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from operator import mul
 
 import numpy as np
 
@@ -38,10 +39,10 @@ class Allocation:
         Where a fin would pass its limit all are scaled together, so that the ratio of rudder to elevator is kept.
         """
         angles = [a * rudder + b * elevator for a, b in self._rows]
-        excess = max(abs(angle) for angle in angles) / self.limit
+        excess = max(map(abs, angles)) / self.limit
         return [angle / excess for angle in angles] if excess > 1.0 else angles
 
     def effective(self, fins: "list[float] | Array") -> tuple[float, float]:
         """Effective rudder and elevator [rad] of measured fin angles [rad] (least squares where fins disagree)."""
-        rudder, elevator = (sum(a * f for a, f in zip(row, fins, strict=True)) for row in self._inverse)
+        rudder, elevator = (sum(map(mul, row, fins)) for row in self._inverse)
         return float(rudder), float(elevator)

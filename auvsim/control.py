@@ -91,10 +91,11 @@ class Autopilot:
         """Takes the compass and depth readings among `readings`."""
         for reading in readings:
             if reading.sensor == "compass":
-                self._heading.update(reading.stamp, float(reading.value[0]))
-                self._pitch.update(reading.stamp, float(reading.value[1]))
+                heading, pitch, _ = reading.value.tolist()
+                self._heading.update(reading.stamp, heading)
+                self._pitch.update(reading.stamp, pitch)
             elif reading.sensor == "depth":
-                self._depth.update(reading.stamp, float(reading.value[0]))
+                self._depth.update(reading.stamp, reading.value.item())
 
     @property
     def heading(self) -> float | None:

@@ -13,7 +13,8 @@ Array = NDArray[np.float64]
 
 FLIP = np.array([1.0, -1.0, -1.0])  # diagonal of the half turn about x
 FLIP6 = np.concatenate([FLIP, FLIP])  # the same for [linear, angular] pairs
-_FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])
+_HALF_TURN, _TURN = math.pi, 2 * math.pi
+FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])  # the same for quaternions wxyz
 
 
 def flip(vector: Array) -> Array:
@@ -30,7 +31,7 @@ def flip_matrix(matrix: Array) -> Array:
 
 def flip_quaternion(quaternion: Array) -> Array:
     """Turns attitude quaternions (..., 4) wxyz between body-to-NED and MuJoCo's body-to-world."""
-    return np.asarray(quaternion, dtype=float) * _FLIP_QUATERNION
+    return np.asarray(quaternion, dtype=float) * FLIP_QUATERNION
 
 
 def euler_to_quaternion(roll: float, pitch: float, yaw: float) -> Array:
@@ -73,4 +74,4 @@ def rotation(roll: float, pitch: float, yaw: float) -> Array:
 
 def wrap(angle: float) -> float:
     """The angle [rad] in (-pi, pi]."""
-    return math.pi - (math.pi - angle) % (2 * math.pi)
+    return _HALF_TURN - (_HALF_TURN - angle) % _TURN

@@ -133,6 +133,7 @@ class Guidance:
         self.attempt = 1
         self.events: list[Event] = []
         self.along = self.cross = math.nan  # of the estimate, dock frame [m]
+        self.axis = 0.0  # course of the dock's axis [rad], the mean of what the dock reported
         self._axis_sum = (0.0, 0.0)
         self._depth_sum, self._fixes = 0.0, 0
         self._last_fix = 0.0
@@ -143,11 +144,6 @@ class Guidance:
         self._side = 1.0  # on which the dock is passed: 1 to starboard of its axis
         self._leg = 1  # of the way to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
         self._phase_start = 0.0
-
-    @property
-    def axis(self) -> float:
-        """Course of the dock's axis [rad], the mean of what the dock reported."""
-        return math.atan2(self._axis_sum[1], self._axis_sum[0])
 
     @property
     def dock_depth(self) -> float:
@@ -165,6 +161,7 @@ class Guidance:
             if reading.sensor == "usbl" and all(map(math.isfinite, reading.value.tolist())):
                 heading, depth = float(reading.value[3]), float(reading.value[6])
                 self._axis_sum = (self._axis_sum[0] + math.cos(heading), self._axis_sum[1] + math.sin(heading))
+                self.axis = math.atan2(self._axis_sum[1], self._axis_sum[0])
                 self._depth_sum += depth
                 self._fixes += 1
                 self._last_fix = max(self._last_fix, reading.received)
@@ -204,14 +201,15 @@ class Guidance:
 
     def _locate(self, time: float, estimate: Estimate, heading: float) -> None:
         """The nose now, by dead reckoning from the last estimate."""
+        north, east, _ = estimate.position.tolist()
         u, v, _ = estimate.velocity.tolist()
         current_north, current_east = estimate.current.tolist()
         cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
-        north = float(estimate.position[0]) + (u * cos - v * sin + current_north) * dt + self._g.nose * cos
-        east = float(estimate.position[1]) + (u * sin + v * cos + current_east) * dt + self._g.nose * sin
-        axis = self.axis
-        self.along = north * math.cos(axis) + east * math.sin(axis)
-        self.cross = east * math.cos(axis) - north * math.sin(axis)
+        north = north + (u * cos - v * sin + current_north) * dt + self._g.nose * cos
+        east = east + (u * sin + v * cos + current_east) * dt + self._g.nose * sin
+        cos, sin = math.cos(self.axis), math.sin(self.axis)
+        self.along = north * cos + east * sin
+        self.cross = east * cos - north * sin
         self._north, self._east, self._current = north, east, (current_north, current_east)
 
     def _enter(self, phase: Phase, time: float, reason: str) -> None:
@@ -249,8 +247,9 @@ class Guidance:
     def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
         """What is wrong with this attempt; enters the last metres when they begin."""
         s, g = self._s, self._g
-        c, cos, sin = estimate.covariance, math.cos(self.axis), math.sin(self.axis)
-        variance = sin * sin * c[0, 0] - 2 * sin * cos * c[0, 1] + cos * cos * c[1, 1]  # across the axis
+        (north, both), (_, east) = estimate.covariance[:2, :2].tolist()
+        cos, sin = math.cos(self.axis), math.sin(self.axis)
+        variance = sin * sin * north - 2 * sin * cos * both + cos * cos * east  # across the axis
         if variance <= g.mouth_radius**2:
             self._certain = time
         if self.phase == Phase.APPROACH and self.along > -s.final_distance:

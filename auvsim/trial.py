@@ -28,6 +28,7 @@ from auvsim.sensors.usbl import Usbl
 from auvsim.truth import DockPose, Truth
 from auvsim.world import World
 
+APPROACHING = (Phase.APPROACH, Phase.FINAL)
 AFTERMATH = 5.0  # how long a trial runs on after its verdict, so that the end can be seen [s]
 
 
@@ -87,6 +88,7 @@ class Loop:
             return stream(seed, trial, f"{name}/{sensor}")
 
         self.current = build_current(plan.current, noise("current"), plan.duration + 1.0)
+        self._approach_matters = not self.current.steady_uniform
         data = mujoco.MjData(scene.model)
         self.world = World(scene.model, data, vehicle, pose, self.current, plan.world.water_density)
         estimator, density = plan.estimator, plan.world.water_density
@@ -187,7 +189,7 @@ class Loop:
         if heading is None or depth is None:  # nothing measured yet: go on as started
             return
         wanted = guidance.update(time, self._estimate, heading, depth, self.world.latched)
-        if guidance.phase in (Phase.APPROACH, Phase.FINAL):
+        if self._approach_matters and guidance.phase in APPROACHING:
             self.current.approach(guidance.attempt, float(np.hypot(*self._truth.position[:2])), time)
         self._commands = autopilot.command(*wanted, guidance.rudder)
         self.world.command(*self._commands)

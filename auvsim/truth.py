@@ -1,12 +1,12 @@
 """What a world says of its vehicle and its dock: the state that sensors measure and logs keep."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from auvsim.frames import Array
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Truth:
+class Truth(NamedTuple):
     """True state of a vehicle at one instant, in NED and forward-starboard-down.
 
     The origin of NED is on the sea surface above the centre of the dock's mouth.

@@ -13,7 +13,7 @@ from auvsim.currents import CurrentField
 from auvsim.errors import DivergenceError, InputError
 from auvsim.fluid import WATER
 from auvsim.forces import RECORD
-from auvsim.frames import FLIP, FLIP6, Array, euler_to_quaternion, flip, flip_matrix, flip_quaternion
+from auvsim.frames import FLIP, FLIP6, FLIP_QUATERNION, Array, euler_to_quaternion, flip, flip_matrix, flip_quaternion
 from auvsim.settings import Settings
 from auvsim.truth import DockPose, Truth
 
@@ -127,10 +127,11 @@ class World:
             data.qpos[q + 3 : q + 7],
             data.qvel[v : v + 6],
         )
+        self._sensors, self._active = data.sensordata, data.eq_active
         self._water = data.userdata[self._slot : self._slot + WATER]
         fins = [model.actuator(f"{vehicle.name}/{fin}") for fin in vehicle.allocation.names]
         shaft = model.actuator(f"{vehicle.name}/shaft")
-        self._fin_controls = [int(fin.id) for fin in fins]
+        self._fins, self._fin_controls = vehicle.allocation.fins, [int(fin.id) for fin in fins]
         self._fin_q = np.array([model.jnt_qposadr[fin.trnid[0]] for fin in fins])
         self._shaft_control, self._shaft_v = int(shaft.id), int(model.jnt_dofadr[shaft.trnid[0]])
         self._captured = int(model.sensor("captured").adr[0])
@@ -163,7 +164,7 @@ class World:
     @property
     def latched(self) -> bool:
         """Whether the dock's latch holds the vehicle."""
-        return bool(self.data.eq_active[self._latch])
+        return bool(self._active[self._latch])
 
     def place(self, position: Array, heading: float, speed: float, shaft_speed: float) -> None:
         """Resets to time zero with the vehicle level at a place, moving ahead through the water.
@@ -212,7 +213,7 @@ class World:
     def command(self, rudder: float, elevator: float, shaft_speed: float) -> None:
         """Sets effective rudder and elevator [rad] and shaft speed [rad/s]; servos and shaft follow with their lags."""
         control = self._control
-        for index, angle in zip(self._fin_controls, self.vehicle.allocation.fins(rudder, elevator), strict=True):
+        for index, angle in zip(self._fin_controls, self._fins(rudder, elevator), strict=True):
             control[index] = angle
         control[self._shaft_control] = shaft_speed
 
@@ -236,7 +237,7 @@ class World:
                 self._watch()
         else:
             self._step(ticks)
-        energy = float(self._qvel @ self._qvel)
+        energy = float(self._qvel.dot(self._qvel))
         if not energy < 1e6:
             raise DivergenceError(self._diagnosis())
 
@@ -249,15 +250,15 @@ class World:
         """Records contact and closes the latch when the nose is in the throat."""
         data = self.data
         if data.ncon:
-            total = 0.0
-            for i in range(data.ncon):
-                if data.contact.efc_address[i] >= 0:
+            total, force = 0.0, self._force[:3]
+            for i, address in enumerate(data.contact.efc_address.tolist()):
+                if address >= 0:
                     mujoco.mj_contactForce(self.model, data, i, self._force)
-                    total += float(np.linalg.norm(self._force[:3]))
+                    total += math.sqrt(force.dot(force))
             if total > 0.0:
                 self.contacts.append(Contact(data.time, total))
-        if data.sensordata[self._captured] > 0.5 and not self.latched:
-            data.eq_active[self._latch] = 1
+        if self._sensors[self._captured] > 0.5 and not self.latched:
+            self._active[self._latch] = 1
 
     def _diagnosis(self) -> str:
         speeds = np.abs(np.nan_to_num(self.data.qvel, nan=np.inf))
@@ -273,11 +274,12 @@ class World:
         """The true state now, in NED and forward-starboard-down."""
         time = self.data.time
         position = self._position * FLIP
-        quaternion = flip_quaternion(self._quaternion)
+        quaternion = self._quaternion * FLIP_QUATERNION
         mujoco.mju_quat2Mat(self._rotation, quaternion)
         r00, _, _, r10, _, _, r20, r21, r22 = self._rotation.tolist()
         nu = self._velocity * FLIP6
-        nu[:3] = nu[:3] @ self._matrix
+        over_ground = nu[:3]
+        over_ground[:] = over_ground.dot(self._matrix)
         return Truth(
             time=time,
             position=position,
@@ -285,6 +287,6 @@ class World:
             attitude=np.array((math.atan2(r21, r22), -math.asin(max(-1.0, min(1.0, r20))), math.atan2(r10, r00))),
             nu=nu,
             current=self._current.evaluate(time, position).velocity,
-            fins=self._qpos[self._fin_q],
+            fins=self._qpos.take(self._fin_q),
             shaft_speed=float(self._qvel[self._shaft_v]),
         )

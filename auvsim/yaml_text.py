@@ -31,7 +31,11 @@ class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict = {}  # noqa: RUF012 (PyYAML fills this class attribute)
 
 
-class _Dumper(yaml.SafeDumper):
+# The compiled one is five times as quick, and each trial writes its scenario; not every PyYAML has it.
+_SafeDumper: type[yaml.SafeDumper] = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+
+class _Dumper(_SafeDumper):
     yaml_implicit_resolvers: dict = {}  # noqa: RUF012
 
     def ignore_aliases(self, data: Any) -> bool:

@@ -22,7 +22,7 @@ def test_readme_has_two_set_up_lines() -> None:
     """One line runs a trial, the other the tests; each begins with an environment of its own."""
     first, second = set_up_lines()
     assert "auvsim dock" in first
-    assert second.endswith("pytest")
+    assert ".venv/bin/pytest -n " in second  # on all cores
 
 
 def test_ci_runs_the_readme_line() -> None:

@@ -53,7 +53,7 @@ def test_installed_wheel_runs_a_trial(wheel: Path, tmp_path: Path) -> None:
     """A fresh environment with nothing but the wheel and what it asks for docks from another folder."""
     run(sys.executable, "-m", "venv", "fresh", folder=tmp_path)
     python = tmp_path / "fresh" / "bin" / "python"
-    run(python, "-m", "pip", "install", "--quiet", wheel, folder=tmp_path)
+    run(python, "-m", "pip", "install", "--quiet", "--no-compile", wheel, folder=tmp_path)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
     where = "from auvsim import library; import estimators; print(library.models_folder())"

@@ -8,6 +8,7 @@ import contextlib
 import logging
 import pickle
 import queue
+import signal
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
@@ -48,7 +49,10 @@ class Cluster:
         with contextlib.ExitStack() as starting:
             local = address is None
             if local:
-                cluster = distributed.LocalCluster(n_workers=jobs, threads_per_worker=1, dashboard_address=":0")
+                with _deaf():
+                    cluster = distributed.LocalCluster(
+                        n_workers=jobs, threads_per_worker=1, dashboard_address=":0", silence_logs=logging.ERROR
+                    )
                 address = starting.enter_context(cluster).scheduler_address
             try:
                 self._client = starting.enter_context(distributed.Client(address, timeout=CONNECTING))
@@ -133,6 +137,19 @@ class Cluster:
 
 def _lost(what: str) -> AuvsimError:
     return AuvsimError(f"the {what}; what is finished is kept, the same command goes on from there")
+
+
+@contextlib.contextmanager
+def _deaf() -> Iterator[None]:
+    """What processes begin in here never hear of Ctrl-C, which reaches all: to be told by the parent is enough."""
+    if threading.current_thread() is not threading.main_thread():  # Python lets no other one choose
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _hush() -> None:

@@ -62,8 +62,8 @@ def run(
         prepare(plan, engine)
         started, before = time.monotonic(), folder.state.get("wall_time", 0.0)
         folder.state.update(_description(plan, engine))
-        folder.save_plan()
         folder.save_state()
+        folder.save_plan()
         tally = _Tally(plan, progress)
         try:
             folder.state["stopped"] = _run_blocks(folder, engine, tally)

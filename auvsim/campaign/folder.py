@@ -36,6 +36,10 @@ class Folder:
         """Where its log is, if the plan keeps it."""
         return self.path / "logs" / variant / f"{trial:06d}.nc"
 
+    def replay_path(self, variant: str, trial: int) -> Path:
+        """The folder of a trial that was run again with `replay_command`."""
+        return self.path / "replays" / f"{variant}-{trial}"
+
     def replay_command(self, variant: str, trial: int) -> str:
         """What runs one trial again, alone and with a video."""
         only = f" --variant {variant}" if len(self.plan.variants) > 1 else ""
@@ -53,7 +57,7 @@ class Folder:
         self._write(self.record_path(variant, trial), _json(record))
 
     def save_plan(self) -> None:
-        """Writes plan.yaml, by which the folder becomes a campaign's; may raise as `save`."""
+        """Writes plan.yaml, by which, with campaign.json, the folder becomes a campaign's; may raise as `save`."""
         self._write(self.path / PLAN, self.plan.to_yaml().encode())
 
     def save_state(self) -> None:
@@ -98,9 +102,22 @@ def open_folder(path: Path) -> Folder:
     Raises:
         InputError: If there is none.
     """
-    if not (path / PLAN).is_file():
-        raise InputError(f"{path}: no campaign; there is no {PLAN} in it")
+    for name in (PLAN, STATE):
+        if not (path / name).is_file():
+            raise InputError(f"{path}: no campaign; there is no {name} in it")
     return Folder(path, plans.load(str(path)), _state(path))
+
+
+def open_begun(path: Path) -> Folder:
+    """The campaign in a folder, to read, of which some trial is done.
+
+    Raises:
+        InputError: If there is none.
+    """
+    found = open_folder(path)
+    if next(found.records(), None) is None:
+        raise InputError(f"{path}: no trial of this campaign is done; `auvsim campaign {path}` runs them")
+    return found
 
 
 @contextmanager
@@ -111,8 +128,10 @@ def claimed(path: Path, plan: Plan, versions: Mapping[str, str]) -> Iterator[Fol
         InputError: If it holds something else, another plan or results of other versions, if another process runs in
             it, or if it cannot be written to.
     """
-    old = (path / PLAN).is_file()
-    if not old and path.is_dir() and any(entry.name != LOCK for entry in path.iterdir()):
+    old = (path / PLAN).is_file() and (path / STATE).is_file()
+    # A run that was killed as it began leaves no plan; without campaign.json the plan is one of the user's own.
+    names = [entry.name for entry in path.iterdir()] if path.is_dir() else []
+    if not old and any(name not in (LOCK, STATE) and ".partial" not in name for name in names):
         raise InputError(f"{path}: holds something else than a campaign; give another folder with --out")
     folder = Folder(path, plan, _state(path) if old else {})
     if old:

@@ -13,7 +13,7 @@ from pydantic import Field, ValidationError
 
 from auvsim import sampling, scenario, schema, yaml_text
 from auvsim.campaign import design
-from auvsim.errors import InputError, unknown_name
+from auvsim.errors import InputError
 from auvsim.settings import Settings
 
 SHIPPED = Path(__file__).parent.parent / "plans"
@@ -141,8 +141,10 @@ def load(name: str) -> Plan:
     elif path.suffix not in (".yaml", ".yml"):
         path = SHIPPED / f"{name}.yaml"
         if not path.is_file():
-            shipped = sorted(known.stem for known in SHIPPED.glob("*.yaml"))
-            raise unknown_name("plan", name, [*shipped, "a .yaml file of your own"])
+            shipped = ", ".join(sorted(known.stem for known in SHIPPED.glob("*.yaml")))
+            raise InputError(
+                f"no plan '{name}': no .yaml file, no folder of a campaign, none that is shipped ({shipped})"
+            )
     document = yaml_text.load(path)
     if not isinstance(document.value, Mapping):
         raise InputError(f"{path}: a plan is a mapping of keys to values, such as `trials: 200`")

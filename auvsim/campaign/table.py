@@ -73,6 +73,7 @@ COLUMNS: dict[str, Column] = {
     "traceback": Column("str", "", "where it was raised"),
 }
 TIMINGS = ("variant", "trial", "wall_time", "cpu_time", "retries", "host")  # may differ from run to run
+REPLAYED = ("docking.mp4", "track.png", "trial.nc")  # what a replay is shown by, the best first
 TOGETHER = 1000  # rows in memory at a time
 
 
@@ -103,10 +104,13 @@ def rows(folder: Folder) -> Iterator[Row]:
         values, run = row(record), record["run"]
         wall = run.get("wall_time")
         log = folder.log_path(values["variant"], values["trial"])
-        values["wall_time"] = wall
+        values |= {"wall_time": wall, "cpu_time": run.get("cpu_time")}
         values["real_time_factor"] = values["time"] / wall if wall and values["time"] is not None else None
         values["command"] = folder.replay_command(values["variant"], values["trial"])
         values["log"] = str(log.relative_to(folder.path)) if log.is_file() else None
+        again = folder.replay_path(values["variant"], values["trial"])
+        shown = next((again / name for name in REPLAYED if (again / name).is_file()), None)
+        values["replay"] = str(shown.relative_to(folder.path)) if shown else None
         yield values
 
 

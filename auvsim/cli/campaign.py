@@ -39,7 +39,9 @@ def run(
         with start as pool, CampaignProgress(chosen.settings.name) as progress:
             done = execution.run(chosen, path, pool, progress)
     except KeyboardInterrupt:
-        print(f"auvsim: interrupted; what is finished is kept, `auvsim campaign {path}` goes on", file=sys.stderr)
+        begun = (path / folder.PLAN).is_file()
+        more = f"; what is finished is kept, `auvsim campaign {path}` goes on" if begun else ", before it began"
+        print(f"auvsim: interrupted{more}", file=sys.stderr)
         return 130
     _report(done)
     return 0
@@ -61,8 +63,8 @@ def replay(name: str, trial: int, *, variant: str | None, out: Path | None, vide
     if variant not in chosen.variants:
         raise unknown_name("variant", variant, list(chosen.variants))
     parsed = scenario.parse(chosen.values(variant, trial))
-    what = f"{variant}-{trial}"
-    path = out or (Path(name, "replays", what) if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{what}")
+    here = Folder(Path(name), chosen).replay_path(variant, trial)
+    path = out or (here if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{variant}-{trial}")
     code = dock.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
     print(f"written: {path}", file=sys.stderr)
     return code
@@ -72,9 +74,9 @@ def report(path: Path) -> int:
     """Writes tables and report of what is finished of a campaign, and prints the rates.
 
     Raises:
-        InputError: If there is no campaign.
+        InputError: If there is no campaign, or no trial of it is done.
     """
-    done = folder.open_folder(path)
+    done = folder.open_begun(path)
     table.write(done)
     _report(done)
     return 0

@@ -113,7 +113,7 @@ def test_rows_that_do_not_fit_are_named():
     with pytest.raises(InputError, match=r"'compass/value' should have shape \(1, 3\)"):
         recorder.finish("complete")
     recorder = writer()
-    recorder.truth(dataclasses.replace(truth(0.0, (0, 0, 0)), fins=np.zeros(3)))
+    recorder.truth(truth(0.0, (0, 0, 0))._replace(fins=np.zeros(3)))
     with pytest.raises(InputError, match="a truth should have 25 numbers"):
         recorder.finish("complete")
     with pytest.raises(InputError, match="no status 'done'; there are complete"):

@@ -289,7 +289,7 @@ def test_lever_arms_and_rotations_undo_the_measurement(case: int) -> None:
         now = standing(place, (0.0, 0.0, heading), 0.5 * tick)
         pings = device.poll(before, now)
         readings = [compass(now.time, heading), Reading("depth", now.time, now.time, np.array([18.0]))]
-        readings += [replace(ping.reading, received=now.time) for ping in pings]
+        readings += [ping.reading._replace(received=now.time) for ping in pings]
         estimate, before = navigator.update(now.time, readings, NONE), now
     assert isinstance(estimate, Estimate)
     # The filter itself leaves millimetres: it believes in noise, but a minute at rest averages none.
@@ -347,10 +347,10 @@ def test_what_is_refused_is_counted_by_reason() -> None:
     unsound = np.where(np.arange(7) == 1, math.nan, fix.value)
     late = [
         fix,
-        replace(fix, stamp=time + 9.0, sequence=501),
-        replace(fix, value=unsound, sequence=502),
-        replace(fix, stamp=time - 1.0, value=wrong, sequence=503),
-        replace(fix, stamp=time - 50.0, sequence=504),
+        fix._replace(stamp=time + 9.0, sequence=501),
+        fix._replace(value=unsound, sequence=502),
+        fix._replace(stamp=time - 1.0, value=wrong, sequence=503),
+        fix._replace(stamp=time - 50.0, sequence=504),
     ]
     counts = navigator.update(time + 0.5, late, ahead)
     assert counts.refused == 5

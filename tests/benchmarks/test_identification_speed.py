@@ -41,14 +41,15 @@ def _compile():
     fit_segments([simulate(VESSEL, "multisine", 0, 20.0).record], START, DEFAULT_FREE, OPTIONS)
 
 
-def record(duration):
-    return simulate(VESSEL, "multisine", 1, duration).record
+def record(benchmark, duration, taste=300.0):
+    """A record of so many seconds; without --benchmark-enable only a taste of it."""
+    return simulate(VESSEL, "multisine", 1, duration if benchmark.enabled else min(duration, taste)).record
 
 
 @pytest.mark.parametrize("duration", [300.0, 3000.0])
 def test_fit_of_segments(benchmark, duration):
     """The whole fit of 14 parameters, current and biases, from a start wrong by up to 30 %."""
-    data = record(duration)
+    data = record(benchmark, duration)
     fit = benchmark.pedantic(fit_segments, ([data], START, DEFAULT_FREE, OPTIONS), rounds=5)
     benchmark.extra_info["iterations"] = fit.iterations
     assert fit.converged
@@ -57,7 +58,7 @@ def test_fit_of_segments(benchmark, duration):
 @pytest.mark.parametrize("duration", [300.0, 3000.0])
 def test_one_step_of_segments(benchmark, duration):
     """Sensitivities, normal equations, elimination and step: one iteration of the fit."""
-    data = record(duration)
+    data = record(benchmark, duration)
     problem = Problem([data], START, DEFAULT_FREE, OPTIONS, 5.0, [smoothed(data, START, SHEETS.vector())])
     values, firsts = START.vector()[problem.indices], [cut.held for cut in problem.cuts]
 
@@ -69,12 +70,12 @@ def test_one_step_of_segments(benchmark, duration):
 
 
 def test_least_squares(benchmark):
-    data = record(300.0)
+    data = record(benchmark, 300.0)
     assert benchmark(fit_least_squares, [data], START).improved
 
 
 def test_prediction_error(benchmark):
-    data = record(300.0)
+    data = record(benchmark, 300.0, taste=60.0)
     rough = fit_segments([data], START, DEFAULT_FREE, OPTIONS).parameters
     options = PredictionErrorOptions(nuisances=SHEETS)
     fit = benchmark.pedantic(fit_prediction_error, ([data], rough, DEFAULT_FREE, options), rounds=1)
@@ -119,7 +120,7 @@ def test_four_parameters_in_scipy(benchmark):
 
 def test_fourteen_parameters_and_segments_in_scipy(benchmark):
     """60 s of what `test_fit_of_segments` does for 300 s: first states are unknowns, and differences dense."""
-    data = record(60.0)
+    data = record(benchmark, 60.0)
     states = [smoothed(data, START, SHEETS.vector())]
     problem = Problem([data], START, DEFAULT_FREE, OPTIONS, 5.0, states)
     k, count = len(DEFAULT_FREE), len(problem.cuts[0].held)
@@ -131,7 +132,9 @@ def test_fourteen_parameters_and_segments_in_scipy(benchmark):
         return np.concatenate([point.residuals[0][there], w[k : k + 6] / SHEETS.vector()])
 
     first = np.concatenate([START.vector()[problem.indices], np.zeros(6), problem.cuts[0].held.ravel()])
-    found = benchmark.pedantic(least_squares, (residuals, first), {"x_scale": "jac", "max_nfev": 20}, rounds=1)
+    found = benchmark.pedantic(
+        least_squares, (residuals, first), {"x_scale": "jac", "max_nfev": 20 if benchmark.enabled else 2}, rounds=1
+    )
     assert np.isfinite(found.cost)
 
 

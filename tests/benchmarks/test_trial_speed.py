@@ -44,9 +44,10 @@ class Recording(Loop):
 
 
 @cache
-def plan() -> scenario.Scenario:
+def plan(factory: str = "augmented_ekf") -> scenario.Scenario:
     """The trial that is timed."""
-    return scenario.parse(sampling.draw(sampling.default_plan(), SEED))
+    values = sampling.merge(sampling.default_plan(), {"estimator": {"factory": factory}})
+    return scenario.parse(sampling.draw(values, SEED))
 
 
 @pytest.fixture(scope="module")
@@ -120,12 +121,13 @@ def test_truth_and_sensors(benchmark, report, recording: Recording) -> None:
 
 
 @pytest.mark.benchmark(group="one trial")
-def test_estimator(benchmark, report, recording: Recording) -> None:
+@pytest.mark.parametrize("factory", ["augmented_ekf", "imm"])
+def test_estimator(benchmark, report, recording: Recording, factory: str) -> None:
     """All its updates, late fixes inserted and replayed."""
     every = round(plan().rates.control / plan().rates.filter)
     starts = range(0, recording.ticks - every + 1, every)
     batches = [list(chain.from_iterable(recording.readings[k : k + every])) for k in starts]
-    navigator = recording.navigator
+    navigator = Loop(plan(factory), SEED, 0).navigator
 
     def updates() -> Estimate:
         navigator.reset()

@@ -8,7 +8,6 @@ from typing import Any
 
 from auvsim.campaign import folder, statistics, table
 from auvsim.campaign.statistics import Difference, Nees, Rate
-from auvsim.errors import InputError
 
 Row = Mapping[str, Any]  # one trial of one variant, as `table.rows` gives it; None where there is no value
 
@@ -46,10 +45,8 @@ def read(path: Path) -> Content:
     Raises:
         InputError: If there is no campaign, or no trial of it is done.
     """
-    opened = folder.open_folder(path)
+    opened = folder.open_begun(path)
     plan, settings, rows = opened.plan, opened.plan.settings, list(table.rows(opened))
-    if not rows:
-        raise InputError(f"{path}: no trial of this campaign is done; `auvsim campaign` runs them")
     return Content(
         name=settings.name,
         variants=plan.variants,

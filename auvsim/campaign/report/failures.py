@@ -22,7 +22,7 @@ def section(content: Content) -> Markup:
         for index, name in enumerate(content.variants)
     ]
     rows = [_line(content, name, [row for row in failed if kind(row) == name]) for name, _ in counts.most_common()]
-    kinds = table(["failure", right("trials"), *heads, "replay"], rows, aria_label="failures")
+    kinds = table(["failure", right("trials"), *heads, "run again"], rows, aria_label="failures")
     return join([note("Choose a kind to list its trials."), kinds])
 
 

@@ -23,13 +23,15 @@ def section(content: Content, cells: Cells | None) -> Markup:
         figures = [_figure(content, cells, frame, index) for index in range(len(content.variants))]
         heading = tag("h3", FRAMES[frame].title)
         drawn.append(tag("div", heading, tag("div", figures, class_="row"), class_=f"frame {frame}"))
-    return tag(
-        "div", note("Choose a cell to list its trials."), _legend(shown), drawn, id="maps", data_measure="docked"
-    )
+    # Where all docked, the attempt still tells currents apart.
+    measures = dict(reversed(MEASURES.items())) if all(row["docked"] for row in content.rows) else MEASURES
+    first = next(iter(measures))
+    hint = note("Choose a cell to list its trials.")
+    return tag("div", hint, _legend(shown, measures), drawn, id="maps", data_measure=first)
 
 
-def _legend(shown: list[str]) -> Markup:
-    menus = [_menu("measure", "trials that", MEASURES)]
+def _legend(shown: list[str], measures: dict[str, str]) -> Markup:
+    menus = [_menu("measure", "trials that", measures)]
     menus += [_menu("frame", "direction", {name: FRAMES[name].choice for name in shown})] if len(shown) > 1 else []
     ramp = [tag("span", "0 %"), tag("span", class_="ramp"), tag("span", "100 % of the trials in a cell")]
     return tag("div", ramp, tag("span", menus, class_="js flex legend"), class_="legend")
@@ -121,7 +123,8 @@ def _ruler(cells: Cells) -> list[Markup]:
         parts.append(tag("line", x1=x, x2=x, y1=y, y2=y + 4.0, class_="zero"))
         if (rings - ring) % every == 0:
             parts.append(tag("text", f"{edge:g}", x=x, y=y + 16.0, text_anchor="middle"))
-    return [*parts, tag("text", "m/s", x=middle + RADIUS + 14.0, y=y + 16.0)]
+    beside = middle + RADIUS + LETTER * (len(f"{cells.edges[-1]:g}") / 2.0 + 1.0)
+    return [*parts, tag("text", "m/s", x=beside, y=y + 16.0)]
 
 
 def _radius(cells: Cells, ring: int) -> float:

@@ -6,7 +6,7 @@ from urllib.parse import quote
 from auvsim.campaign.report.cells import FRAMES, Cells
 from auvsim.campaign.report.chart import colour
 from auvsim.campaign.report.content import Content, Row
-from auvsim.campaign.report.markup import Markup, number, table, tag
+from auvsim.campaign.report.markup import Markup, join, number, table, tag
 
 COLUMNS = {  # column: heading
     "attempts": "attempts",
@@ -28,7 +28,7 @@ def kind(row: Row) -> str:
 
 def section(content: Content, cells: Cells | None) -> Markup:
     """All trials."""
-    heads = ["variant", "trial", "outcome", *COLUMNS.values(), *content.drawn, "log", "replay"]
+    heads = ["variant", "trial", "outcome", *COLUMNS.values(), *content.drawn, "kept", "run again"]
     index = {name: number for number, name in enumerate(content.variants)}
     rows = [_row(content, row, index[row["variant"]], cells) for row in content.rows]
     buttons = [tag("th", tag("button", text, type="button", class_="plain"), scope="col") for text in heads]
@@ -55,8 +55,9 @@ def _row(content: Content, row: Row, index: int, cells: Cells | None) -> Markup:
 
 
 def kept(row: Row) -> Markup | None:
-    """A link to the log of a trial, if it is kept."""
-    return tag("a", "log", href=quote(row["log"])) if row["log"] else None
+    """Links to the log of a trial, if it is kept, and to what was made when it was run again, if it was."""
+    links = [tag("a", name, href=quote(row[name])) for name in ("log", "replay") if row.get(name)]
+    return join([[link, " "] for link in links]) if links else None
 
 
 def command(row: Row) -> Markup:

@@ -8,6 +8,7 @@ import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from campaign_jobs import ENDINGS, misbehave
 
@@ -107,6 +108,22 @@ def test_kill_9_of_the_scheduler_loses_nothing_that_was_finished(
         execution.run(plan, tmp_path / "unharmed", pool)
     assert finished.items() <= {path: path.read_bytes() for path in tmp_path.glob("c/trials/*/*/0*.json")}.items()
     assert tables(tmp_path / "c") == tables(tmp_path / "unharmed")
+
+
+def test_a_cluster_without_any_worker_left_ends(
+    elsewhere: tuple[str, list[subprocess.Popen]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It waits a while for others, then one line says so; what was done is given before."""
+    address, (_, worker) = elsewhere
+    with Cluster(address, 1) as cluster:
+        monkeypatch.setattr("auvsim.campaign.cluster.CONNECTING", 3.0)
+        monkeypatch.setattr("auvsim.campaign.cluster.WATCH", 0.5)
+        outcomes = cluster.run(misbehave, [1, ("sleep", 60.0), ("sleep", 60.0)], timeout=90.0)
+        assert next(outcomes) == (1, 1)
+        for process in [*psutil.Process(worker.pid).children(recursive=True), worker]:
+            process.kill()
+        with pytest.raises(AuvsimError, match=r"^the Dask cluster has lost all workers; what is finished is kept"):
+            next(outcomes)
 
 
 def test_no_cluster_there(monkeypatch: pytest.MonkeyPatch) -> None:

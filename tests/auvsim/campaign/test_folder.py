@@ -73,9 +73,12 @@ def test_one_campaign_a_folder(begun: Path, planned: Callable[..., Plan], tmp_pa
         "c: was begun with auvsim 1, and this is 2": (begun, planned(), {"auvsim": "2"}),
         "d: holds something else than a campaign": (tmp_path / "d", planned(), VERSIONS),
         "cannot be written to: it is a file, not a folder": (tmp_path / "d" / "file", planned(), VERSIONS),
+        "e: holds something else than a campaign": (tmp_path / "e", planned(), VERSIONS),
     }
     (tmp_path / "d").mkdir()
     (tmp_path / "d" / "file").write_text("precious")
+    (tmp_path / "e").mkdir()
+    (tmp_path / "e" / "plan.yaml").write_text(planned().to_yaml())  # the user's own, where it was not run
     for text, (path, plan, versions) in refused.items():
         with pytest.raises(InputError, match=text), claimed(path, plan, versions):
             pass
@@ -88,6 +91,14 @@ def test_one_campaign_a_folder(begun: Path, planned: Callable[..., Plan], tmp_pa
     assert {path: path.read_bytes() for path in begun.rglob("*") if path.is_file()} == before
     with claimed(begun, planned(trials=400, timeout=9.0), VERSIONS):
         pass  # more trials of the same
+
+
+def test_what_was_killed_as_it_began_begins_again(planned: Callable[..., Plan], tmp_path: Path) -> None:
+    """Nothing was done; what is there is no obstacle."""
+    for name in (".lock", "campaign.json", ".plan.77.partial.yaml"):
+        (tmp_path / name).touch()
+    with claimed(tmp_path, planned(), VERSIONS) as opened:
+        assert opened.state == {}
 
 
 def test_a_new_folder_that_stays_empty_goes(planned: Callable[..., Plan], tmp_path: Path) -> None:

@@ -148,7 +148,7 @@ def test_the_shipped_plan() -> None:
     assert found.settings.trials == 200
     assert len(found.variants) == 3
     assert len({found.values(name, 0)["estimator"]["factory"] for name in found.variants}) == 3
-    with pytest.raises(InputError, match=r"no plan 'navigator'; there are a \.yaml file of your own, navigators"):
+    with pytest.raises(InputError, match=r"no plan 'navigator': .*shipped \(navigators\)"):
         plan.load("navigator")
 
 

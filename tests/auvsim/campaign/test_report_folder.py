@@ -16,6 +16,7 @@ SUMMARY = {"docked": True, "attempts": 1, "failure_reason": None, "crossings": [
 def campaign(path: Path, trials: int) -> Folder:
     """A folder with the first trials of both variants; those of the second fail by an error."""
     made = Folder(path, plan.parse(PLAN))
+    made.save_state()
     made.save_plan()
     for trial in range(trials):
         scenario = {"current.speed": 0.1 * trial, "current.direction_deg": 10.0, "dock.heading_deg": 0.0}
@@ -40,7 +41,7 @@ def test_report_is_made_of_what_the_folder_holds(tmp_path: Path) -> None:
     for name in ("a", "b"):
         for trial in (0, 1):
             assert made.replay_command(name, trial) in text
-    assert {entry.name for entry in tmp_path.iterdir()} == {"plan.yaml", "trials", "report.html"}
+    assert {entry.name for entry in tmp_path.iterdir()} == {"plan.yaml", "campaign.json", "trials", "report.html"}
 
 
 def test_report_is_the_same_each_time(tmp_path: Path) -> None:
@@ -57,17 +58,20 @@ def test_command_makes_the_report_again(tmp_path: Path) -> None:
     assert (tmp_path / "report.html").is_file()
 
 
-@pytest.mark.parametrize("case", ["missing", "empty", "no trial", "unwritable"])
+@pytest.mark.parametrize("case", ["missing", "empty", "only a plan", "no trial", "unwritable"])
 def test_what_cannot_be_reported_is_one_line(case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Exit code 2, the place and the reason, and no report."""
     folder = tmp_path / "campaign"
     if case != "missing":
         folder.mkdir()
+    if case == "only a plan":
+        (folder / "plan.yaml").write_text("trials: 3")
     if case == "no trial":
         campaign(folder, 0)
     if case == "unwritable":
         campaign(folder, 1)
         (folder / "report.html").mkdir()
+    before = list(tmp_path.rglob("*"))
     with pytest.raises(InputError, match=str(folder)):
         report.write(folder)
     assert cli.main(["report", str(folder)]) == 2
@@ -76,3 +80,4 @@ def test_what_cannot_be_reported_is_one_line(case: str, tmp_path: Path, capsys: 
     assert str(folder) in said
     assert said.count("\n") == 1
     assert not (folder / "report.html").is_file()
+    assert case == "unwritable" or list(tmp_path.rglob("*")) == before

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from synthetic_campaign import TRIALS, VARIANTS, content, row, rows
 
-from auvsim.campaign.report import cells, misses
+from auvsim.campaign.report import cells, cost, misses
 from auvsim.campaign.report import html as page
 from auvsim.campaign.report.chart import Scale, interval_scale
 from auvsim.campaign.report.markup import VOID, Markup, number, percent, tag
@@ -65,12 +65,13 @@ def text() -> str:
 
 
 def test_the_page_is_whole_and_asks_for_nothing(text: str) -> None:
-    """Well formed, no identifier twice, and links only within the page, to kept logs and to nothing else."""
+    """Well formed, no identifier twice, and links only within the page and to what is kept."""
     reader = Reader(text)
     assert len(reader.ids) == len(set(reader.ids))
     kept = {f"logs/{r['trial']}%20100%25.nc" for r in rows() if r["log"]}
     assert kept
-    assert set(reader.links) == kept | {"#trials", "data:,", "plan.yaml", "table.csv"}
+    again = "replays/careful-7/docking.mp4"
+    assert set(reader.links) == kept | {again, "#trials", "data:,", "plan.yaml", "table.csv"}
     assert not re.search(r"@import|url\(|fetch\(|XMLHttp|WebSocket|https?:", text)
 
 
@@ -120,6 +121,14 @@ def test_the_map_counts_what_docked(text: str) -> None:
         assert sums.tolist() == [2 * sum(r["docked"] for r in mine), 2 * TRIALS, 2 * first], index  # two frames
 
 
+def test_the_map_shows_first_what_tells_currents_apart(text: str) -> None:
+    """Success where some failed; where all docked, the first attempt."""
+    assert 'data-measure="docked"' in text
+    docked = page(content(rows=[{**r, "docked": True} for r in rows()]))
+    assert 'data-measure="first"' in docked
+    assert docked.index('<option value="first">') < docked.index('<option value="docked">')
+
+
 def test_the_curve_of_misses_is_the_share_of_all_trials() -> None:
     """Where the curve ends, and where it passes the median, by counting."""
     text = misses.section(content())
@@ -132,6 +141,12 @@ def test_the_curve_of_misses_is_the_share_of_all_trials() -> None:
         assert (np.diff(points, axis=0) * [1.0, -1.0] >= 0.0).all()  # a staircase up
         assert points[-1, 1] == pytest.approx(up(len(passed) / TRIALS), abs=0.05)  # a tenth of a pixel is written
         assert len(points) == 2 * len(passed) + 1
+
+
+def test_cost_is_that_of_all_trials() -> None:
+    """60 trials of 0.25 s are a quarter of a minute."""
+    cells = re.findall(r"<td[^>]*>([^<]*)</td>", cost.section(content()))
+    assert cells[: len(cost.HEADS)] == ["60", "0.500", "0.500", "600", "0.250", "0.250"]
 
 
 def test_headline_is_the_best_first_with_its_interval() -> None:

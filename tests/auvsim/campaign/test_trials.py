@@ -5,6 +5,7 @@ import math
 from collections.abc import Iterator
 from pathlib import Path
 
+import psutil
 import pytest
 from pyarrow import parquet
 
@@ -90,7 +91,20 @@ def test_parquet_and_csv_hold_the_rows(done: Folder) -> None:
     assert all(0.0 < float(each["cpu_time"]) < math.inf for each in times)
 
 
-ONLY_HERE = ("wall_time", "real_time_factor", "command", "log")
+ONLY_HERE = ("wall_time", "cpu_time", "real_time_factor", "command", "log", "replay")
+
+
+def test_memory_does_not_grow_with_the_number_of_trials(tmp_path: Path) -> None:
+    """Of this process and the worker, from the 20th to the 80th trial: less than a third of a trial's log each."""
+    used: dict[int, float] = {}
+
+    def look(progress: execution.Progress) -> None:
+        here = psutil.Process()
+        used[progress.done] = sum(each.memory_info().rss for each in (here, *here.children(recursive=True))) / 1e6
+
+    with Pool(1) as pool:
+        execution.run(plan.parse({"trials": 80, "base": {"duration": 60.0}}), tmp_path / "c", pool, look)
+    assert used[80] - used[20] < 6.0, used  # [MB]; a log of a minute takes 0.35
 
 
 def test_dask_gives_the_same_table(done: Folder, tmp_path: Path) -> None:
@@ -111,6 +125,8 @@ def test_one_trial_again(
     again = done.path / "replays" / "plain-1"
     assert log.differences(log.read(again / "trial.nc"), log.read(done.log_path("plain", 1))) == []
     assert {path.name for path in again.iterdir()} == {"trial.nc", "summary.json"}
+    replays = {(row["variant"], row["trial"]): row["replay"] for row in table.rows(done)}
+    assert {place: path for place, path in replays.items() if path} == {("plain", 1): "replays/plain-1/trial.nc"}
     capsys.readouterr()
     for arguments, text in (
         (["--trial", "1"], "command line: --trial needs --variant; there are plain, raises"),
