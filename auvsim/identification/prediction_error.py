@@ -18,7 +18,6 @@ from auvsim.identification import compiled
 from auvsim.identification.constraints import has_inertia, limits
 from auvsim.identification.fit import (
     DEFAULT_FREE,
-    MASSES,
     Fit,
     Mask,
     Nuisances,
@@ -28,7 +27,7 @@ from auvsim.identification.fit import (
     residual_summary,
     with_values,
 )
-from auvsim.identification.least_squares import regress
+from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import first_belief, smoothed, substeps
 from estimators.planar_model import PlanarParameters
@@ -222,10 +221,11 @@ def _begin(likelihood: Likelihood) -> _Point:
     """
     options, start = likelihood.options, likelihood.start
     logs = np.log(np.maximum(np.array(options.densities)[likelihood.noisy], 1e-12))
-    candidates = [start.vector()[likelihood.indices]]
-    if not set(likelihood.free) & set(MASSES):
-        ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
-        candidates.append(regress(likelihood.records, ways, start, likelihood.indices)[0])
+    ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
+    candidates = (
+        start.vector()[likelihood.indices],
+        first_values(likelihood.records, ways, start, likelihood.free),
+    )
     points = [
         likelihood.at(np.clip(np.concatenate([values, logs]), likelihood.low, likelihood.high)) for values in candidates
     ]

@@ -24,7 +24,7 @@ LOSSES: tuple[Loss, ...] = ("squares", "huber", "cauchy")
 # Deviations about the smoothed state at which a segment's first state is held, so that one that a short segment does
 # not show stays where a vehicle can be; hundreds of times wider than what is measured.
 _FIRST = np.array([100.0, 100.0, 1.0, 1.0, 1.0, 1.0])
-_DAMPING = 1e-6  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
+_DAMPING = 1e-3  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,7 +32,6 @@ class SegmentOptions:
     """How segments are cut and weighed."""
 
     length: float = 5.0  # of a segment [s]; infinite: each record is one
-    schedule: tuple[float, ...] = (1.0,)  # shorter ones that are fitted before [s]
     nuisances: Nuisances = field(default_factory=Nuisances)
     loss: Loss = "squares"
     threshold: float = 2.5  # of a robust loss, in deviations
@@ -174,7 +173,7 @@ class Problem:
 
 
 def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | None = None) -> tuple[Point, int, bool]:
-    """Levenberg and Marquardt's way down, on unknowns in units of their own curvature.
+    """Levenberg and Marquardt's way down, on unknowns in units of their own curvature, damped as by Nielsen (1999).
 
     Args:
         problem: Whose cost it is.
@@ -185,10 +184,12 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
     Returns:
         The lowest point, the iterations, and whether no step would lower the cost any more.
     """
-    damping = _DAMPING
+    damping, growth = _DAMPING, 2.0
     low, high = problem.low, problem.high
     if fixed is not None:
         low, high = np.where(fixed, point.values, low), np.where(fixed, point.values, high)
+    if not np.isfinite(point.cost):
+        return point, 0, False
     for iteration in range(1, problem.options.max_iterations + 1):
         H, g, backs = problem.reduced(point, damping)
         step = _solved(H, g, damping, low - point.values, high - point.values)
@@ -199,12 +200,12 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
         if not trial.cost < point.cost:
             if last or damping > 1e12:
                 return point, iteration, last
-            damping *= 10.0
+            damping, growth = damping * growth, 2.0 * growth
             continue
         if last:
             return trial, iteration, True
-        if point.cost - trial.cost > 0.5 * gain:
-            damping = max(0.1 * damping, 1e-12)
+        ratio = (point.cost - trial.cost) / gain
+        damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-9), 2.0
         point = trial
     return point, problem.options.max_iterations, False
 

@@ -105,7 +105,7 @@ def near():
 
 def test_four_parameters_here(benchmark):
     run, _, _ = whole_record()
-    options = SegmentOptions(nuisances=NO_NUISANCES, length=math.inf, schedule=())
+    options = SegmentOptions(nuisances=NO_NUISANCES, length=math.inf)
     fit = benchmark(fit_segments, [run.record], with_values(PARAMETERS, SHORT, near()), SHORT, options)
     assert fit.converged
 

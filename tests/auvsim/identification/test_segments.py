@@ -150,7 +150,7 @@ def test_elimination_equals_the_full_normal_equations():
 def test_a_small_fit_has_scipys_optimum():
     """SciPy's least squares with finite differences, on the motion and measurements written anew."""
     run = simulate(replace(VESSEL, errors=NO_NUISANCES), "zigzag", 4, 12.0)
-    free, options = ("X_uu", "N_dd"), SegmentOptions(length=6.0, schedule=(), nuisances=NO_NUISANCES, tolerance=1e-10)
+    free, options = ("X_uu", "N_dd"), SegmentOptions(length=6.0, nuisances=NO_NUISANCES, tolerance=1e-10)
     fit = fit_segments([run.record], with_values(PARAMETERS, free, [-3.0, 9.0]), free, options)
     cuts = problem(run, free, options, 6.0).cuts[0]
     held = smoothed(run.record, with_values(PARAMETERS, free, [-3.0, 9.0]), np.zeros(6))[cuts.bounds[:-1], :6]
