@@ -113,7 +113,7 @@ def first_values(
     values = dict(zip(free, start.vector()[free_indices(free)].tolist(), strict=True))
     if wild := [name for name in free if name in _WILD]:
         *_, terms = regress(records, ways, start, free_indices(wild))
-        values |= {name: 0.0 for name, seen in zip(wild, terms.any(axis=(0, 1)), strict=True) if seen}
+        values |= {name: 0.0 for name, seen in zip(wild, np.any(terms, axis=(0, 1)).tolist(), strict=True) if seen}
     if linear := [name for name in free if name not in (*MASSES, *_WILD)]:
         calm = with_values(start, free, np.array(list(values.values())))
         found, *_ = regress(records, ways, calm, free_indices(linear))
