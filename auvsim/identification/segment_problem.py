@@ -205,7 +205,8 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
         if last:
             return trial, iteration, True
         ratio = (point.cost - trial.cost) / gain
-        damping, growth = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-9), 2.0
+        least = 0.1 if abs(ratio - 1.0) < 0.1 else 1.0 / 3.0  # faster where the sum of squares is all but quadratic
+        damping, growth = max(damping * max(least, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-9), 2.0
         point = trial
     return point, problem.options.max_iterations, False
 
