@@ -43,6 +43,13 @@ def rate(stage, j, A, B, turn, s2, s3, s4, s5):
 
 
 @compiled
+def workspace(k, size):
+    """What `advance` writes in, of k free parameters among `size`."""
+    stages = np.zeros((4, 3, 3)), np.zeros((4, 3, 4 + k)), np.empty((4, 4))
+    return np.empty(6), np.empty(6), np.zeros(3), np.zeros((3, size)), *stages
+
+
+@compiled
 def advance(x, S, u, p, free, nuisance, h, work):
     """One step of Runge and Kutta of length `h` [s], in place; a column goes through all four stages at once."""
     xs, total, l, B, As, Bs, turn = work
@@ -156,10 +163,7 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
     S, J, y, x = np.zeros((6, 4 + k)), np.zeros((8, width)), np.empty(8), np.empty(6)
     R, scaled = np.zeros((8, width)), np.zeros(8)  # rows and residuals with all their weights
     here = np.zeros(8, dtype=np.bool_)
-    work = (
-        np.empty(6), np.empty(6), np.zeros(3), np.zeros((3, p.size)), np.zeros((4, 3, 3)), np.zeros((4, 3, 4 + k)),
-        np.empty((4, 4)),
-    )  # fmt: skip
+    work = workspace(k, p.size)
     cost = 0.0
     for s in range(count):
         x[:] = starts[s]
