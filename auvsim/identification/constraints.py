@@ -1,4 +1,4 @@
-"""What physics says of the planar parameters: inertia is positive, damping takes energy."""
+"""What physics says of the planar parameters: inertia is positive, damping takes energy; and steps that keep to it."""
 
 from collections.abc import Sequence
 
@@ -37,3 +37,24 @@ def has_inertia(p: PlanarParameters) -> bool:
     """Whether the inertia is positive: every acceleration of the vehicle costs energy."""
     M = inertia(p)
     return bool(np.linalg.eigvalsh(0.5 * (M + M.T))[0] > 0.0)
+
+
+def bounded_step(H: Array, g: Array, damping: float, low: Array, high: Array) -> Array:
+    """The damped step of equations scaled to a unit diagonal, its parts kept between limits (k,) where there are.
+
+    What would cross its limit stops there, and the rest is solved again.
+    """
+    diagonal = np.diag(H).copy()
+    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    part = H / np.outer(scale, scale) + damping * np.eye(len(g))
+    low, high = (np.concatenate([side, np.full(len(g) - len(side), e)]) for side, e in ((low, -np.inf), (high, np.inf)))
+    step, loose = np.zeros(len(g)), diagonal > 0.0
+    while loose.any():
+        rest = g / scale - part @ np.where(loose, 0.0, step * scale)
+        step[loose] = np.linalg.lstsq(part[np.ix_(loose, loose)], rest[loose], rcond=1e-14)[0] / scale[loose]
+        crossing = loose & ((step < low) | (step > high))
+        if not crossing.any():
+            break
+        step[crossing] = np.clip(step, low, high)[crossing]
+        loose &= ~crossing
+    return step

@@ -15,7 +15,7 @@ import numpy as np
 
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification import compiled
-from auvsim.identification.constraints import has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits
 from auvsim.identification.fit import (
     DEFAULT_FREE,
     Fit,
@@ -37,6 +37,7 @@ NOISES = ("north", "east", "heading", "surge", "sway", "yaw_rate")
 _FLOOR, _CEILING = math.log(1e-14), math.log(1e2)  # of the densities
 _PROBE = 1e-5  # differences change an acceleration by this much [m/s^2, rad/s^2], and logarithms of densities by
 _PROBE_LOG = 1e-4
+_STRIDE = 2.0  # longest step of a density's logarithm: one that falls to nothing at once leaves no gradient behind
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -262,38 +263,29 @@ def profile(
 
 def _maximise(likelihood: Likelihood, point: _Point, fixed: Mask | None = None) -> tuple[_Point, Array, int, bool]:
     """Fisher scoring, damped as by Levenberg and Marquardt; the point, its information, iterations, convergence."""
-    options, damping = likelihood.options, 1e-4
+    options, low, high = likelihood.options, likelihood.low, likelihood.high
+    if fixed is not None:
+        low, high = np.where(fixed, point.unknowns, low), np.where(fixed, point.unknowns, high)
+    reach = np.where(np.arange(len(low)) < len(likelihood.free), np.inf, _STRIDE)
+    damping, growth = 1e-4, 2.0
     H, g = likelihood.information(point)
     for iteration in range(1, options.max_iterations + 1):
-        held = ((point.unknowns <= likelihood.low) & (g > 0.0)) | ((point.unknowns >= likelihood.high) & (g < 0.0))
-        if fixed is not None:
-            held |= fixed
-        step = _scored(H, g, damping, held)
+        down, up = np.maximum(low - point.unknowns, -reach), np.minimum(high - point.unknowns, reach)
+        step = bounded_step(H, -g, damping, down, up)
         gain = -0.5 * float(g @ step)
-        trial = likelihood.at(np.clip(point.unknowns + step, likelihood.low, likelihood.high))
+        trial = likelihood.at(np.clip(point.unknowns + step, low, high))
         last = gain < options.tolerance and damping <= 1e-3
         if trial.cost < point.cost:
-            damping = max(0.1 * damping, 1e-9) if point.cost - trial.cost > 0.5 * gain else damping
+            damping, growth = max(0.1 * damping, 1e-9) if point.cost - trial.cost > 0.5 * gain else damping, 2.0
             point = trial
             H, g = likelihood.information(point)
         elif damping > 1e10:
             return point, H, iteration, last
         else:
-            damping *= 10.0
+            damping, growth = growth * damping, 2.0 * growth
         if last:
             return point, H, iteration, True
     return point, H, options.max_iterations, False
-
-
-def _scored(H: Array, g: Array, damping: float, held: Mask) -> Array:
-    """A damped step down, of equations scaled to a unit diagonal; zero in what is held."""
-    loose = ~held & (np.diag(H) > 0.0)
-    step = np.zeros(len(g))
-    if loose.any():
-        scale = np.sqrt(np.diag(H)[loose])
-        part = H[np.ix_(loose, loose)] / np.outer(scale, scale) + damping * np.eye(int(loose.sum()))
-        step[loose] = -np.linalg.lstsq(part, g[loose] / scale, rcond=1e-14)[0] / scale
-    return step
 
 
 def _flat(point: _Point) -> tuple[Array, Array]:

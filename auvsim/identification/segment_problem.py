@@ -12,7 +12,7 @@ import numpy as np
 
 from auvsim.errors import InputError
 from auvsim.identification import compiled
-from auvsim.identification.constraints import has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits
 from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import substeps
@@ -192,7 +192,7 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
         return point, 0, False
     for iteration in range(1, problem.options.max_iterations + 1):
         H, g, backs = problem.reduced(point, damping)
-        step = _solved(H, g, damping, low - point.values, high - point.values)
+        step = bounded_step(H, g, damping, low - point.values, high - point.values)
         eliminated = sum(np.sum(g[:, :6] * back[:, :, -1]) for (_, g), back in zip(point.folds, backs, strict=True))
         gain = 0.5 * float(g @ step + eliminated)
         trial = problem.moved(point, step, backs)
@@ -209,27 +209,6 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
         damping, growth = max(damping * max(least, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-9), 2.0
         point = trial
     return point, problem.options.max_iterations, False
-
-
-def _solved(H: Array, g: Array, damping: float, low: Array, high: Array) -> Array:
-    """The damped step of equations scaled to a unit diagonal, its parts kept between limits (k,) where there are.
-
-    What would cross its limit stops there, and the rest is solved again.
-    """
-    diagonal = np.diag(H).copy()
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    part = H / np.outer(scale, scale) + damping * np.eye(len(g))
-    low, high = (np.concatenate([side, np.full(len(g) - len(side), e)]) for side, e in ((low, -np.inf), (high, np.inf)))
-    step, loose = np.zeros(len(g)), diagonal > 0.0
-    while loose.any():
-        rest = g / scale - part @ np.where(loose, 0.0, step * scale)
-        step[loose] = np.linalg.lstsq(part[np.ix_(loose, loose)], rest[loose], rcond=1e-14)[0] / scale[loose]
-        crossing = loose & ((step < low) | (step > high))
-        if not crossing.any():
-            break
-        step[crossing] = np.clip(step, low, high)[crossing]
-        loose &= ~crossing
-    return step
 
 
 def _cut(record: Record, length: float, states: Array) -> _Cut:

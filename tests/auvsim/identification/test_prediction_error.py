@@ -131,6 +131,7 @@ def test_without_noise_the_polish_agrees_with_segments():
     run = simulate(Vessel(parameters=PARAMETERS), "multisine", 4, 100.0)
     rough = fit_segments([run.record], PARAMETERS, FREE, SegmentOptions(nuisances=SHEETS, length=math.inf))
     polished = fit_prediction_error([run.record], rough.parameters, FREE, OPTIONS)
+    assert polished.converged
     # Midpoint against Runge and Kutta, 0.07 % where intervals are 0.15 %; densities that cannot be below zero.
     assert np.abs((polished.values - rough.values) / polished.deviations).max() < 1.0
     assert polished.noise is not None
