@@ -66,14 +66,15 @@ def run_one(model: str, identified: Path, seed: int, trial: int) -> Summary:
             believed = str(identified)
         elif model == "wrong":
             believed = str(Path(folder) / "wrong.yaml")
-            planar_sets.write(_set(wrong(seed, trial)), Path(believed))
+            planar_sets.write(model_set(wrong(seed, trial)), Path(believed))
         plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": believed}})
         return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
 
 
-def _set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
+def model_set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
+    """A file's content of parameters that were not identified."""
     return planar_sets.PlanarSet(
-        vehicle=VEHICLE, speed=SPEED, method="condensed, wrong by 20 %", start="-", version="-", sources=(),
+        vehicle=VEHICLE, speed=SPEED, method="made up", start="-", version="-", sources=(),
         parameters=planar_sets.coefficients(parameters, {}),
     )  # fmt: skip
 
