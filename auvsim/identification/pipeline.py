@@ -190,8 +190,9 @@ def _fits(
         fits.append(found)
     if "prediction error" in steps:
         say("prediction error", 0.3)
-        before = fits[-1].parameters if "segments" in steps else start
-        fits.append(fit_prediction_error(records, before, free, PredictionErrorOptions(signs=True, prior=prior)))
+        guess = fits[-1].parameters if "segments" in steps else None
+        options = PredictionErrorOptions(signs=True, prior=prior)
+        fits.append(fit_prediction_error(records, start, free, options, guess=guess))
     return fits, prior, notes
 
 

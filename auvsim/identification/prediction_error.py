@@ -194,11 +194,19 @@ def fit_prediction_error(
     start: PlanarParameters,
     free: Sequence[str] = DEFAULT_FREE,
     options: PredictionErrorOptions | None = None,
+    *,
+    guess: PlanarParameters | None = None,
 ) -> Fit:
     """Fits free parameters and densities of the process noise by the likelihood of a filter's innovations.
 
-    A polish: start it from a fit of segments that has converged; where least squares are likelier it begins there.
     The covariance is the inverse of Fisher's information.
+
+    Args:
+        records: What was measured.
+        start: What is not free, the middle of the prior, and what the fit is compared with.
+        free: Names of the free ones.
+        options: What the filter believes.
+        guess: Where to begin, such as a fit of segments; where the start or least squares are likelier, it is there.
 
     Raises:
         InputError: Records, names or options that cannot be used, or a start with which the filter fails.
@@ -211,11 +219,11 @@ def fit_prediction_error(
     if len(options.densities) != len(NOISES) or not all(0.0 <= q < math.inf for q in options.densities):
         raise InputError(f"densities {options.densities} of the process noise must be {len(NOISES)} numbers >= 0")
     likelihood = Likelihood(records, start, free, options)
-    return likelihood.report(*_maximise(likelihood, _begin(likelihood)))
+    return likelihood.report(*_maximise(likelihood, _begin(likelihood, guess)))
 
 
-def _begin(likelihood: Likelihood) -> _Point:
-    """The likelier of the start and of what least squares make of smoothed states.
+def _begin(likelihood: Likelihood, guess: PlanarParameters | None) -> _Point:
+    """The likeliest of the start, the guess, and what least squares make of smoothed states.
 
     Raises:
         InputError: The filter fails with either.
@@ -224,7 +232,7 @@ def _begin(likelihood: Likelihood) -> _Point:
     logs = np.log(np.maximum(np.array(options.densities)[likelihood.noisy], 1e-12))
     ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
     candidates = (
-        start.vector()[likelihood.indices],
+        *(given.vector()[likelihood.indices] for given in (start, guess) if given is not None),
         first_values(likelihood.records, ways, start, likelihood.free),
     )
     points = [

@@ -124,8 +124,8 @@ def noisy(seed: int, duration: float = 300.0) -> Noisy:
     output = fit_segments([run.record], truth.parameters, truth.free, whole)
     start = _wrong(truth, seed)
     rough = fit_segments([run.record], start, truth.free, OPTIONS)
-    better = rough.parameters if rough.converged else start
-    polished = fit_prediction_error([run.record], better, truth.free, PredictionErrorOptions(nuisances=SHEETS))
+    options, guess = PredictionErrorOptions(nuisances=SHEETS), rough.parameters if rough.converged else None
+    polished = fit_prediction_error([run.record], start, truth.free, options, guess=guess)
     size = sizes(polished)
     known = np.array([c.weights for c in assess(polished).combinations if c.deviation <= WEAK])
     errors = [np.abs(known @ ((fit.values - truth.values) / size)) for fit in (polished, output)]
