@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
@@ -158,7 +159,7 @@ def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
         values = [f"{rms(squares(summaries, quantity, phase)):.3f}" for summaries in study.values()]
         ratios = [ratio(study["identified"], study[model], quantity, phase) for model in others]
         label = f"{quantity}{'' if phase == 'all' else f', {phase}'}, rms [{unit}]"
-        result.add_row(label, *values, *(f"{r.value:.3f} ({r.low:.3f}-{r.high:.3f})" for r in ratios))
+        result.add_row(escape(label), *values, *(f"{r.value:.3f} ({r.low:.3f}-{r.high:.3f})" for r in ratios))
     result.add_row("NEES of the position", *(f"{_nees(summaries):.2f}" for summaries in study.values()))
     return result
 
