@@ -150,9 +150,9 @@ def parameter_panel(axes: Axes, found: Identification, *, numbers: bool = True) 
     axes.invert_yaxis()
     axes.axvline(0.0, color="#888888", lw=0.8)
     axes.set_xlim(-1.6, 1.6)
-    dress(axes, "Parameters (dot), 95 % interval (bar), start (tick)", "value by the larger of start and fit", "")
-    if assessed.weak:
-        axes.text(0.01, 0.01, f"red: deviation above {WEAK:.0%}", transform=axes.transAxes, fontsize=9, color=UNKNOWN)
+    weak = f"; red: deviation above {WEAK:.0%}" if assessed.weak else ""
+    title = "Parameters (dot), 95 % interval (bar), start (tick)"
+    dress(axes, title, f"value by the larger of start and fit{weak}", "")
 
 
 def correlation_panel(axes: Axes, found: Identification) -> None:
