@@ -10,14 +10,7 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 
 from auvsim.errors import InputError
-from auvsim.identification.fit import (
-    DEFAULT_FREE,
-    Fit,
-    check,
-    invert,
-    residual_summary,
-    with_values,
-)
+from auvsim.identification.fit import DEFAULT_FREE, Fit, check, invert, residual_summary, with_values
 from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.segment_problem import LOSSES, Point, Problem, SegmentOptions, minimise
@@ -63,11 +56,13 @@ def _lowest(problem: Problem, states: Sequence[Array]) -> tuple[Point, int, bool
     No more are tried once noise explains an end, or two starts have come to the same.
     """
     point, iterations, converged = _down(problem, problem.start.vector()[problem.indices])
-    for values in _other_starts(problem, states):
-        if converged and not _unlikely(point):
+    others = _other_starts(problem, states)
+    while not converged or _unlikely(point):
+        values, before = next(others, (None, 0))
+        if values is None:
             break
-        other, more, ended = _down(problem, values)
-        iterations += more
+        other, used, ended = _down(problem, values)
+        iterations += before + used
         same = converged and ended and abs(other.cost - point.cost) < problem.options.tolerance
         if other.cost < point.cost + (problem.options.tolerance if ended else 0.0):
             point, converged = other, ended
@@ -76,13 +71,14 @@ def _lowest(problem: Problem, states: Sequence[Array]) -> tuple[Point, int, bool
     return point, iterations, converged
 
 
-def _other_starts(problem: Problem, states: Sequence[Array]) -> Iterator[Array]:
-    """Values (k,) of the free parameters from which to go down."""
+def _other_starts(problem: Problem, states: Sequence[Array]) -> Iterator[tuple[Array, int]]:
+    """Values (k,) of the free parameters from which to go down, and the iterations that they took."""
     options, records = problem.options, [cut.record for cut in problem.cuts]
     values = first_values(records, states, problem.start, problem.free)
-    yield values
+    yield values, 0
     length = _LONGER * options.length if math.isfinite(options.length) else _FROM_WHOLE
-    yield _down(Problem(records, problem.start, problem.free, options, length, states), values)[0].values
+    point, used, _ = _down(Problem(records, problem.start, problem.free, options, length, states), values)
+    yield point.values, used
 
 
 def _down(problem: Problem, values: Array) -> tuple[Point, int, bool]:
