@@ -20,7 +20,6 @@ from estimators.types import Array
 
 _UNLIKELY = 5.0  # deviations of chi-square beyond which the lowest point from the start may not be the lowest of all
 _LONGER = 4.0  # times longer segments have other false bottoms: they fail from one start in 50, and not from the same
-_START_COST = 0.1  # share of the start's cost, at the fit's first states, to which the lowest one there is looked for
 _FROM_WHOLE = 20.0  # segments from which a fit of whole records may start [s]
 
 
@@ -138,8 +137,8 @@ def _report(problem: Problem, point: Point, iterations: int, converged: bool) ->
     own = np.zeros_like(point.nuisances)
     own[problem.active] = np.sqrt(np.diag(covariance)[k:])
     first = problem.at(problem.start.vector()[problem.indices], point.nuisances, point.starts)
-    rough = max(problem.options.tolerance, _START_COST * first.cost)
-    first, _, _ = minimise(problem, first, rough, np.ones(k, dtype=bool))
+    # From the fit's first states one step is all but the lowest, and where it is not the start is far off in any case.
+    first, _, _ = minimise(problem, first, max(problem.options.tolerance, first.cost), np.ones(k, dtype=bool))
     rms, white = residual_summary(point.residuals)
     limit = "" if converged else f"stopped after {iterations} iterations before it had converged"
     return Fit(
