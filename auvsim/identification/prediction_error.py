@@ -15,7 +15,7 @@ import numpy as np
 
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification import compiled
-from auvsim.identification.constraints import bounded_step, has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import (
     DEFAULT_FREE,
     Fit,
@@ -50,6 +50,7 @@ class PredictionErrorOptions:
     nuisances: Nuisances = field(default_factory=Nuisances)
     signs: bool = False  # as in SegmentOptions
     prior: float | None = None  # as in SegmentOptions
+    believed: tuple[str, ...] | None = None  # as in SegmentOptions
     # Longest step of the filter's midpoint rule [s]: in steps of 0.1 s its error of (0.1 lambda)^2 / 6, 0.3 % at a yaw
     # that decays with lambda = 1.3 1/s, would go into the parameters.
     max_substep: float = 0.05
@@ -91,9 +92,7 @@ class Likelihood:
         self.trust = np.zeros(len(self.low))  # of the weak prior
         self.centre = np.zeros(len(self.low))
         self.centre[: len(free)] = self._vector[self.indices]
-        if options.prior is not None:
-            reach = options.prior * np.abs(self.centre)
-            self.trust = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+        self.trust[: len(free)] = prior_information(self.centre[: len(free)], free, options.prior, options.believed)
 
     def split(self, unknowns: Array) -> tuple[PlanarParameters, Array]:
         """Parameters and densities (12,) of the filter's states."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from auvsim.errors import InputError
 from auvsim.identification import compiled
-from auvsim.identification.constraints import bounded_step, has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import substeps
@@ -37,6 +37,7 @@ class SegmentOptions:
     threshold: float = 2.5  # of a robust loss, in deviations
     signs: bool = False  # keeps the parameters of constraints.SIGNS on their side of zero
     prior: float | None = None  # weak prior: the start, with this relative deviation
+    believed: tuple[str, ...] | None = None  # parameters that it holds; None: all
     max_iterations: int = 50
     tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
 
@@ -97,10 +98,7 @@ class Problem:
             if record.current is not None:
                 self._expected[r, :2] = record.current
         self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
-        self._prior = np.zeros(len(free))
-        if options.prior is not None:
-            reach = options.prior * np.abs(self._vector[self.indices])
-            self._prior = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+        self._prior = prior_information(self._vector[self.indices], free, options.prior, options.believed)
         self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
         self.nuisances[:, 2:] = 0.0
 

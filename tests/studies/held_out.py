@@ -1,6 +1,6 @@
 """Identification from 300 s of manoeuvres of the MuJoCo vehicle, judged on manoeuvres of other kinds.
 
-From the checkout: `python -m tests.studies.held_out --seeds 10 --first 40`.
+From the checkout: `python -m tests.studies.held_out --seeds 10 --first 50`.
 """
 
 import argparse
@@ -24,7 +24,7 @@ from auvsim.trial import run_trial
 
 FITTED = {"multisine": 150.0, "zigzag": 150.0}  # duration of each, approach and all [s]
 HELD_OUT = {"circle": 300.0, "spiral": None}  # None: as long as it takes
-FIRST_SEED = 40  # none from there on was used while the fits were built
+FIRST_SEED = 50  # none from there on was used while the fits were built
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -295,6 +295,9 @@ def test_a_weak_prior_holds_what_data_do_not():
     size = np.abs([getattr(PARAMETERS, name) for name in free])
     assert (held.deviations <= 0.3 * size).all()
     assert (loose.deviations > 1.5 * held.deviations).any()
+    one = fit_segments([run.record], PARAMETERS, free, SegmentOptions(prior=0.3, believed=("X_nu",)))
+    assert one.deviations[2] <= 0.3 * size[2]
+    assert (one.deviations[:2] > held.deviations[:2]).all()  # the data alone tell these
 
 
 def test_bad_input_is_refused():
