@@ -39,6 +39,8 @@ MANOEUVRE = {
     "dock": {"heading_deg": 180.0},
     "sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}},
 }
+# One whose figures nobody reads off: at a single speed its log could not tell thrust, drag and their loss apart.
+SPEEDS = {"multisine": (1.5, 1.0, 1.8, 1.2)}  # [m/s]
 
 
 def default_plan() -> dict:
@@ -48,7 +50,8 @@ def default_plan() -> dict:
 
 def manoeuvre_plan(kind: str) -> dict:
     """The installed plan of a manoeuvre: the default one, far from the dock and with DVL and gyro."""
-    return merge(default_plan(), {**MANOEUVRE, "manoeuvre": {"kind": kind}})
+    speeds = {"speed_steps": SPEEDS[kind]} if kind in SPEEDS else {}
+    return merge(default_plan(), {**MANOEUVRE, "manoeuvre": {"kind": kind, **speeds}})
 
 
 def load_plan(path: Path) -> tuple[dict, dict[str, str]]:

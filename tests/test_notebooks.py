@@ -13,6 +13,7 @@ NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 PRINTED = {  # what shows that a notebook came to its point
     "01_first_docking": ["docked: True"],
     "02_docking_navigation": ["loses to the paper's filter: none", "not met: none"],
+    "03_identification": ["these are degrees", "below 2 %: True; better than its start: True", "lake.yaml  docked"],
     "07_campaign": ["8 trials, then 12", "the same to the last bit: True"],
 }
 

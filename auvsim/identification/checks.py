@@ -10,6 +10,8 @@ from auvsim.errors import InputError
 from auvsim.identification.columns import Meaning
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signals
+from estimators.errors import ParameterError
+from estimators.planar_filter import steady_surge
 from estimators.planar_model import MAX_SUBSTEP, PlanarParameters, PlanarProcess
 from estimators.types import Array
 
@@ -124,24 +126,52 @@ def _heading_and_gyro(one: Signals) -> None:
 
 
 def _speeds_and_positions(one: Signals) -> None:
-    """The way by positions against that by the log over ground."""
-    if not {"north", "east", "ground_surge"} <= one.signals.keys():
-        return
-    north, east, log = (one.signals[name] for name in ("north", "east", "ground_surge"))
-    times = np.arange(max(north.times[0], log.times[0]), min(north.times[-1], log.times[-1]), 10.0)
-    if len(times) < 5:
-        return
-    legs = np.hypot(
-        np.diff(np.interp(times, north.times, north.values)), np.diff(np.interp(times, east.times, east.values))
-    )
-    areas = np.concatenate([[0.0], np.cumsum(np.diff(log.times) * 0.5 * np.abs(log.values[1:] + log.values[:-1]))])
-    ratio = float(np.median(np.diff(np.interp(times, log.times, areas)) / np.maximum(legs, 1e-3)))
-    for wrong, unit in ((3600.0 / 1852.0, "knots"), (100.0, "cm/s"), (1000.0, "mm/s"), (3.6, "km/h")):
-        if 0.9 < ratio / wrong < 1.1 and wrong > 1.5:
-            raise InputError(
-                f"{one.name}: the log's speed is {ratio:.3g} times that of the positions: is it in {unit}? "
-                "name its unit in the column, such as `dvl_u [kn]`"
+    """The way by positions against that by the log over ground, and this against that through the water."""
+    if {"north", "east", "ground_surge"} <= one.signals.keys():
+        north, east, log = (one.signals[name] for name in ("north", "east", "ground_surge"))
+        times = np.arange(max(north.times[0], log.times[0]), min(north.times[-1], log.times[-1]), 10.0)
+        if len(times) >= 5:
+            legs = np.hypot(
+                np.diff(np.interp(times, north.times, north.values)), np.diff(np.interp(times, east.times, east.values))
             )
+            areas = np.cumsum(np.diff(log.times) * 0.5 * np.abs(log.values[1:] + log.values[:-1]))
+            run = np.diff(np.interp(times, log.times, np.concatenate([[0.0], areas])))
+            ratio = float(np.median(run / np.maximum(legs, 1e-3)))
+            _speed_unit(f"{one.name}: the log's speed is {ratio:.3g} times that of the positions", ratio, 1.1)
+    if {"surge", "ground_surge"} <= one.signals.keys():
+        ratio, sharp = _water_by_ground(one)
+        _speed_unit(
+            f"{one.name}: surge through the water is {ratio:.3g} times that over ground", ratio, 1.2 if sharp else 1.33
+        )
+
+
+def _water_by_ground(one: Signals) -> tuple[float, bool]:
+    """Ratio of the log's two surges; and whether headings enough tell the current from it."""
+    water, ground, heading = (one.signals.get(name) for name in ("surge", "ground_surge", "heading"))
+    assert water is not None
+    assert ground is not None
+    over = np.interp(water.times, ground.times, ground.values)
+    if heading is not None:
+        turn = np.exp(1j * np.interp(water.times, heading.times, heading.values))
+        if abs(turn.mean()) < 0.95:
+            share = np.linalg.lstsq(np.column_stack([water.values, turn.real, turn.imag]), over, rcond=None)[0][0]
+            return 1.0 / max(float(share), 1e-6), True
+    return float(np.median(np.abs(water.values))) / max(float(np.median(np.abs(over))), 1e-3), False
+
+
+def _speed_unit(said: str, ratio: float, spread: float) -> None:
+    """Refuses a ratio of speeds that is nearly that of two units.
+
+    Raises:
+        InputError: It is; with that unit.
+    """
+    for factor, unit in ((3600.0 / 1852.0, "kn"), (100.0, "cm/s"), (1000.0, "mm/s"), (3.6, "km/h")):
+        if factor < 2.0 and spread > 1.3:
+            continue  # knots and a current are not told apart
+        if 1.0 / spread < ratio / factor < spread:
+            raise InputError(f"{said}: is it in {unit}? name its unit in the column, such as `u [{unit}]`")
+        if 1.0 / spread < ratio * factor < spread:
+            raise InputError(f"{said}: is it in m/s, not in {unit}? name its unit in the column, such as `u [m/s]`")
 
 
 def records(found: Sequence[Record], start: PlanarParameters) -> None:
@@ -161,6 +191,7 @@ def records(found: Sequence[Record], start: PlanarParameters) -> None:
             "manoeuvres of two minutes each are better"
         )
     _answer(found, start)
+    _headway(found, start)
     moved = max(float(np.std(record.inputs[:, 0])) for record in found)
     if moved < STILL:
         at = np.degrees(np.mean(np.concatenate([record.inputs[:, 0] for record in found])))
@@ -168,6 +199,24 @@ def records(found: Sequence[Record], start: PlanarParameters) -> None:
             f"the rudder stays at {at:.1f} deg throughout: nothing in sway and yaw can be learnt; "
             "log a zig-zag, turns to both sides, or a multisine"
         )
+
+
+def _headway(found: Sequence[Record], start: PlanarParameters) -> None:
+    """Speed measured against that which the start's shaft gives: factors of 10 and more."""
+    for name in ("surge", "ground_surge"):
+        speeds = np.concatenate([record.measured[:, MEASURED.index(name)] for record in found])
+        if not np.isfinite(speeds).any():
+            continue
+        try:
+            expected = steady_surge(start, float(np.median(np.concatenate([r.inputs[:, 1] for r in found]))))
+        except ParameterError:  # a start without drag
+            return
+        ratio = float(np.nanmedian(np.abs(speeds))) / max(expected, 1e-3)
+        if ratio > 5.0 or ratio < 0.2:
+            raise InputError(
+                f"the {name.replace('_', ' ')} is {ratio:.3g} times what this shaft speed gives a vehicle of its kind: "
+                "one of the two is in other units than its header says; name both as they are: `n [rpm]`, `u [m/s]`"
+            )
 
 
 def _answer(found: Sequence[Record], start: PlanarParameters) -> None:

@@ -28,6 +28,7 @@ class Combination:
     weights: Array  # (k,) of unit length, in the order of the free parameters
     deviation: float  # relative standard deviation along it
     text: str  # for example "0.71 Y_uv + 0.70 Y_ur"
+    named: tuple[str, ...]  # the parameters in it
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -164,4 +165,5 @@ def _crossing(profile: Callable[[float], float], best: float, step: float, reach
 def _combination(free: Sequence[str], weights: Array, deviation: float) -> Combination:
     order = [j for j in np.argsort(-np.abs(weights)) if abs(weights[j]) >= _NAMED]
     text = " ".join(f"{'-' if weights[j] < 0.0 else '+'} {abs(weights[j]):.2f} {free[j]}" for j in order)
-    return Combination(weights=weights, deviation=deviation, text=text.removeprefix("+ "))
+    named = tuple(str(free[int(j)]) for j in order)
+    return Combination(weights=weights, deviation=deviation, text=text.removeprefix("+ "), named=named)

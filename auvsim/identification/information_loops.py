@@ -8,7 +8,7 @@ import numpy as np
 from estimators.compiling import compiled
 
 if TYPE_CHECKING:
-    from auvsim.identification.segment_loops import advance, observe
+    from auvsim.identification.segment_loops import advance, observe, workspace
 
 
 @compiled
@@ -29,12 +29,11 @@ def gather(x, S, M, inputs, weights, p, free, h):
     k = free.size
     width = k + 12
     y, J, nuisance = np.empty(8), np.zeros((8, width)), np.zeros(6)
-    scratch = np.zeros(3), np.zeros((3, 3)), np.zeros((3, p.size))
-    work = np.empty(6), np.empty(6), np.empty(6), np.empty_like(S), np.empty_like(S), np.empty_like(S)
+    work, everything = workspace(k, p.size), np.ones(8, dtype=np.bool_)
     reach = 0.0
     for t in range(inputs.shape[0]):
-        advance(x, S, inputs[t], p, free, nuisance, h, scratch, work)
-        observe(x, S, 0.0, nuisance, k, y, J)
+        advance(x, S, inputs[t], p, free, nuisance, h, work)
+        observe(x, S, 0.0, nuisance, k, everything, y, J)
         for c in range(2, 8):  # no positions
             square = weights[c] * weights[c]
             for i in range(width):

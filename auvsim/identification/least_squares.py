@@ -22,6 +22,9 @@ from auvsim.identification.states import smoothed
 from estimators.planar_model import PlanarParameters
 from estimators.types import Array
 
+# Quadratic in what is hardly seen: with errors in the smoothed sway least squares give them wild values of either sign.
+_WILD = ("X_dd", "Y_vv", "Y_rr", "N_vv", "N_rr")
+
 
 def fit_least_squares(
     records: Sequence[Record],
@@ -94,6 +97,28 @@ def regress(
     before = start.vector()[indices]
     aside, covariance = _solved(changes - terms @ before, terms)
     return before + aside, covariance, changes, terms
+
+
+def first_values(
+    records: Sequence[Record], ways: Sequence[Array], start: PlanarParameters, free: Sequence[str]
+) -> Array:
+    """Free parameters (k,) from which a fit may go down: zero where least squares mislead, masses as in the start.
+
+    Args:
+        records: What was measured.
+        ways: Smoothed states (n, 12) along each.
+        start: The masses, and what is not free.
+        free: Names of the free ones.
+    """
+    values = dict(zip(free, start.vector()[free_indices(free)].tolist(), strict=True))
+    if wild := [name for name in free if name in _WILD]:
+        *_, terms = regress(records, ways, start, free_indices(wild))
+        values |= {name: 0.0 for name, seen in zip(wild, np.any(terms, axis=(0, 1)).tolist(), strict=True) if seen}
+    if linear := [name for name in free if name not in (*MASSES, *_WILD)]:
+        calm = with_values(start, free, np.array(list(values.values())))
+        found, *_ = regress(records, ways, calm, free_indices(linear))
+        values |= dict(zip(linear, found.tolist(), strict=True))
+    return np.array(list(values.values()))
 
 
 def _equations(

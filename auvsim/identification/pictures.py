@@ -65,6 +65,7 @@ def states_panels(figure: Any, judged: Judged) -> None:
     rows = slice(first, first + len(fit.times))
     rudder = np.degrees(judged.record.inputs[rows, 0])
     axes[0].plot(fit.times, rudder, color="black", lw=1.1)
+    axes[0].set_ylim(*_limits(float(rudder.min()), float(rudder.max()), least=1.0))  # a rudder held is a line
     dress(axes[0], f"Held out: {judged.record.name}, predicted from its rudder and shaft alone", "", "rudder\n[deg]")
     for panel, (channel, column, factor, label) in zip(axes[1:], _STATES, strict=True):
         measured = judged.record.measured[rows, MEASURED.index(channel)]
@@ -80,7 +81,7 @@ def states_panels(figure: Any, judged: Judged) -> None:
         low, high = np.percentile(shown, (0.5, 99.5))
         panel.set_ylim(*_limits(min(low, values.min()), max(high, values.max())))
     figure.align_ylabels(list(axes))
-    axes[1].legend(loc="upper right", ncols=3, fontsize=9.5, framealpha=0.9)
+    axes[1].legend(loc="best", ncols=3, fontsize=9.5, framealpha=0.9)
     axes[-1].set_xlabel("time since the prediction began [s]", fontsize=10.5)
     axes[-1].set_xlim(0.0, fit.times[-1])
 
@@ -91,8 +92,8 @@ def _turns(measured: Array, modelled: Array) -> float:
     return 2.0 * math.pi * round(float(np.mean((measured - modelled)[there])) / (2.0 * math.pi)) if there.any() else 0.0
 
 
-def _limits(low: float, high: float) -> tuple[float, float]:
-    margin = max(0.08 * (high - low), 1e-3)
+def _limits(low: float, high: float, least: float = 1e-3) -> tuple[float, float]:
+    margin = max(0.08 * (high - low), least)
     return low - margin, high + margin
 
 
@@ -149,9 +150,9 @@ def parameter_panel(axes: Axes, found: Identification, *, numbers: bool = True) 
     axes.invert_yaxis()
     axes.axvline(0.0, color="#888888", lw=0.8)
     axes.set_xlim(-1.6, 1.6)
-    dress(axes, "Parameters (dot), 95 % interval (bar), start (tick)", "value by size", "")
-    if assessed.weak:
-        axes.text(0.01, 0.01, f"red: deviation above {WEAK:.0%}", transform=axes.transAxes, fontsize=9, color=UNKNOWN)
+    weak = f"; red: deviation above {WEAK:.0%}" if assessed.weak else ""
+    title = "Parameters (dot), 95 % interval (bar), start (tick)"
+    dress(axes, title, f"value by the larger of start and fit{weak}", "")
 
 
 def correlation_panel(axes: Axes, found: Identification) -> None:

@@ -11,7 +11,7 @@ from auvsim import library
 from auvsim.condense import condense
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification import checks, judgement
-from auvsim.identification.constraints import SIGNS, limits
+from auvsim.identification.constraints import SIGNS, limits, prior_information
 from auvsim.identification.fit import DEFAULT_FREE, Fit, invert
 from auvsim.identification.identifiability import Identifiability, assess, likelihood_interval, sizes
 from auvsim.identification.judgement import Judged
@@ -122,9 +122,9 @@ def identify(
     if not judging:
         records, judging, said = judgement.choose(records)
     checks.records(records, start)
-    fits, prior, notes = _fits(records, start, free, steps, say)
+    fits, believed, notes = _fits(records, start, free, steps, say)
     fit = fits[-1]
-    assessed = assess(fit if prior is None else _by_data_alone(fit, prior))
+    assessed = assess(_by_data_alone(fit, believed) if believed else fit)
     intervals, profiled = _intervals(records, fits, assessed, say)
     say("predicting what was held out", 0.95)
     judged = tuple(judgement.judge(record, start, fit.parameters) for record in judging)
@@ -165,11 +165,11 @@ def _fits(
     free: Sequence[str],
     steps: Sequence[str],
     say: Callable[[str, float], None],
-) -> tuple[list[Fit], float | None, list[Verdict]]:
-    """The fit of each step, each from the one before; the prior that was needed, if any, and what that means."""
+) -> tuple[list[Fit], tuple[str, ...], list[Verdict]]:
+    """The fit of each step, each from the one before; parameters whose start was believed, and what that means."""
     fits: list[Fit] = []
     notes: list[Verdict] = []
-    prior = None
+    believed: tuple[str, ...] = ()
     if "least squares" in steps:
         say("least squares", 0.0)
         fits.append(fit_least_squares(records, start, free))
@@ -178,31 +178,29 @@ def _fits(
         found = fit_segments(records, start, free, SegmentOptions(length=LENGTH, signs=True))
         blind = assess(found).blind
         if blind or not found.converged:
-            prior = PRIOR
+            believed = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
             why = f"cannot tell {'; '.join(c.text for c in blind)}" if blind else "lead to no end"
-            notes.append(
-                Verdict(
-                    good=False,
-                    text=f"the data alone {why}: the start was believed to within {PRIOR:.0%}, and decides these",
-                )
-            )
-            found = fit_segments(records, start, free, SegmentOptions(length=LENGTH, signs=True, prior=prior))
+            text = f"the data alone {why}: the start of {', '.join(believed)} was believed to within {PRIOR:.0%}"
+            notes.append(Verdict(good=False, text=f"{text}, and decides these"))
+            options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, believed=believed)
+            found = fit_segments(records, start, free, options)
         fits.append(found)
     if "prediction error" in steps:
         say("prediction error", 0.3)
-        before = fits[-1].parameters if "segments" in steps else start
-        fits.append(fit_prediction_error(records, before, free, PredictionErrorOptions(signs=True, prior=prior)))
-    return fits, prior, notes
+        guess = fits[-1].parameters if "segments" in steps else None
+        held = PredictionErrorOptions(signs=True, prior=PRIOR if believed else None, believed=believed)
+        fits.append(fit_prediction_error(records, start, free, held, guess=guess))
+    return fits, believed, notes
 
 
-def _by_data_alone(fit: Fit, prior: float) -> Fit:
+def _by_data_alone(fit: Fit, believed: Sequence[str]) -> Fit:
     """The same with the covariance that the data alone would give."""
-    reach = prior * np.abs([getattr(fit.start, name) for name in fit.free])
-    believed = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+    centre = np.array([getattr(fit.start, name) for name in fit.free])
+    prior = prior_information(centre, fit.free, PRIOR, believed)
     known = np.isfinite(fit.deviations) & (fit.deviations > 0.0)
     information = np.zeros_like(fit.covariance)
     information[np.ix_(known, known)] = np.linalg.inv(fit.covariance[np.ix_(known, known)])
-    return replace(fit, covariance=invert(information - np.diag(np.where(known, believed, 0.0))))
+    return replace(fit, covariance=invert(information - np.diag(np.where(known, prior, 0.0))))
 
 
 def _intervals(

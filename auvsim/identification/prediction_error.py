@@ -15,10 +15,9 @@ import numpy as np
 
 from auvsim.errors import InputError, unknown_name
 from auvsim.identification import compiled
-from auvsim.identification.constraints import has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import (
     DEFAULT_FREE,
-    MASSES,
     Fit,
     Mask,
     Nuisances,
@@ -28,7 +27,7 @@ from auvsim.identification.fit import (
     residual_summary,
     with_values,
 )
-from auvsim.identification.least_squares import regress
+from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import first_belief, smoothed, substeps
 from estimators.planar_model import PlanarParameters
@@ -38,6 +37,7 @@ NOISES = ("north", "east", "heading", "surge", "sway", "yaw_rate")
 _FLOOR, _CEILING = math.log(1e-14), math.log(1e2)  # of the densities
 _PROBE = 1e-5  # differences change an acceleration by this much [m/s^2, rad/s^2], and logarithms of densities by
 _PROBE_LOG = 1e-4
+_STRIDE = 2.0  # longest step of a density's logarithm: one that falls to nothing at once leaves no gradient behind
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -50,6 +50,7 @@ class PredictionErrorOptions:
     nuisances: Nuisances = field(default_factory=Nuisances)
     signs: bool = False  # as in SegmentOptions
     prior: float | None = None  # as in SegmentOptions
+    believed: tuple[str, ...] | None = None  # as in SegmentOptions
     # Longest step of the filter's midpoint rule [s]: in steps of 0.1 s its error of (0.1 lambda)^2 / 6, 0.3 % at a yaw
     # that decays with lambda = 1.3 1/s, would go into the parameters.
     max_substep: float = 0.05
@@ -91,9 +92,7 @@ class Likelihood:
         self.trust = np.zeros(len(self.low))  # of the weak prior
         self.centre = np.zeros(len(self.low))
         self.centre[: len(free)] = self._vector[self.indices]
-        if options.prior is not None:
-            reach = options.prior * np.abs(self.centre)
-            self.trust = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+        self.trust[: len(free)] = prior_information(self.centre[: len(free)], free, options.prior, options.believed)
 
     def split(self, unknowns: Array) -> tuple[PlanarParameters, Array]:
         """Parameters and densities (12,) of the filter's states."""
@@ -194,11 +193,19 @@ def fit_prediction_error(
     start: PlanarParameters,
     free: Sequence[str] = DEFAULT_FREE,
     options: PredictionErrorOptions | None = None,
+    *,
+    guess: PlanarParameters | None = None,
 ) -> Fit:
     """Fits free parameters and densities of the process noise by the likelihood of a filter's innovations.
 
-    A polish: start it from a fit of segments that has converged; where least squares are likelier it begins there.
     The covariance is the inverse of Fisher's information.
+
+    Args:
+        records: What was measured.
+        start: What is not free, the middle of the prior, and what the fit is compared with.
+        free: Names of the free ones.
+        options: What the filter believes.
+        guess: Where to begin, such as a fit of segments; where the start or least squares are likelier, it is there.
 
     Raises:
         InputError: Records, names or options that cannot be used, or a start with which the filter fails.
@@ -211,21 +218,22 @@ def fit_prediction_error(
     if len(options.densities) != len(NOISES) or not all(0.0 <= q < math.inf for q in options.densities):
         raise InputError(f"densities {options.densities} of the process noise must be {len(NOISES)} numbers >= 0")
     likelihood = Likelihood(records, start, free, options)
-    return likelihood.report(*_maximise(likelihood, _begin(likelihood)))
+    return likelihood.report(*_maximise(likelihood, _begin(likelihood, guess)))
 
 
-def _begin(likelihood: Likelihood) -> _Point:
-    """The likelier of the start and of what least squares make of smoothed states.
+def _begin(likelihood: Likelihood, guess: PlanarParameters | None) -> _Point:
+    """The likeliest of the start, the guess, and what least squares make of smoothed states.
 
     Raises:
         InputError: The filter fails with either.
     """
     options, start = likelihood.options, likelihood.start
     logs = np.log(np.maximum(np.array(options.densities)[likelihood.noisy], 1e-12))
-    candidates = [start.vector()[likelihood.indices]]
-    if not set(likelihood.free) & set(MASSES):
-        ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
-        candidates.append(regress(likelihood.records, ways, start, likelihood.indices)[0])
+    ways = [smoothed(record, start, options.nuisances.vector()) for record in likelihood.records]
+    candidates = (
+        *(given.vector()[likelihood.indices] for given in (start, guess) if given is not None),
+        first_values(likelihood.records, ways, start, likelihood.free),
+    )
     points = [
         likelihood.at(np.clip(np.concatenate([values, logs]), likelihood.low, likelihood.high)) for values in candidates
     ]
@@ -262,38 +270,29 @@ def profile(
 
 def _maximise(likelihood: Likelihood, point: _Point, fixed: Mask | None = None) -> tuple[_Point, Array, int, bool]:
     """Fisher scoring, damped as by Levenberg and Marquardt; the point, its information, iterations, convergence."""
-    options, damping = likelihood.options, 1e-4
+    options, low, high = likelihood.options, likelihood.low, likelihood.high
+    if fixed is not None:
+        low, high = np.where(fixed, point.unknowns, low), np.where(fixed, point.unknowns, high)
+    reach = np.where(np.arange(len(low)) < len(likelihood.free), np.inf, _STRIDE)
+    damping, growth = 1e-4, 2.0
     H, g = likelihood.information(point)
     for iteration in range(1, options.max_iterations + 1):
-        held = ((point.unknowns <= likelihood.low) & (g > 0.0)) | ((point.unknowns >= likelihood.high) & (g < 0.0))
-        if fixed is not None:
-            held |= fixed
-        step = _scored(H, g, damping, held)
+        down, up = np.maximum(low - point.unknowns, -reach), np.minimum(high - point.unknowns, reach)
+        step = bounded_step(H, -g, damping, down, up)
         gain = -0.5 * float(g @ step)
-        trial = likelihood.at(np.clip(point.unknowns + step, likelihood.low, likelihood.high))
+        trial = likelihood.at(np.clip(point.unknowns + step, low, high))
         last = gain < options.tolerance and damping <= 1e-3
         if trial.cost < point.cost:
-            damping = max(0.1 * damping, 1e-9) if point.cost - trial.cost > 0.5 * gain else damping
+            damping, growth = max(0.1 * damping, 1e-9) if point.cost - trial.cost > 0.5 * gain else damping, 2.0
             point = trial
             H, g = likelihood.information(point)
         elif damping > 1e10:
             return point, H, iteration, last
         else:
-            damping *= 10.0
+            damping, growth = growth * damping, 2.0 * growth
         if last:
             return point, H, iteration, True
     return point, H, options.max_iterations, False
-
-
-def _scored(H: Array, g: Array, damping: float, held: Mask) -> Array:
-    """A damped step down, of equations scaled to a unit diagonal; zero in what is held."""
-    loose = ~held & (np.diag(H) > 0.0)
-    step = np.zeros(len(g))
-    if loose.any():
-        scale = np.sqrt(np.diag(H)[loose])
-        part = H[np.ix_(loose, loose)] / np.outer(scale, scale) + damping * np.eye(int(loose.sum()))
-        step[loose] = -np.linalg.lstsq(part, g[loose] / scale, rcond=1e-14)[0] / scale
-    return step
 
 
 def _flat(point: _Point) -> tuple[Array, Array]:

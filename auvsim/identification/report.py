@@ -25,7 +25,8 @@ th { border-bottom: 1px solid #999; font-weight: 600; } td:first-child, th:first
 tr:nth-child(even) td { background: #f5f6f8; } .weak td { color: #b03060; }
 .verdicts { list-style: none; padding: 0; }
 .verdicts li { padding: .25em .6em; margin: .25em 0; border-left: 5px solid; }
-.good { border-color: #2c7a2c; background: #eef6ee; } .bad { border-color: #c77700; background: #fdf5e6; }
+.verdicts .good { border-color: #2c7a2c; background: #eef6ee; }
+.verdicts .bad { border-color: #c77700; background: #fdf5e6; }
 .pair { display: flex; flex-wrap: wrap; gap: 1em; } .pair > div { flex: 1 1 500px; } svg { width: 100%; height: auto; }
 .small { color: #555; font-size: .9em; }
 """

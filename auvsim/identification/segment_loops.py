@@ -23,54 +23,78 @@ if TYPE_CHECKING:  # CasADi writes it in front of this text
 
 
 @compiled
-def slopes(x, S, u, p, free, nuisance, scratch, K, dK):
-    """Time derivatives K (6,) of the state and dK (6, columns) of its sensitivities S by heading, nu and parameters."""
-    l, A, B = scratch
-    linearise(x[3:], u, p, l, A, B)
-    cosine, sine = math.cos(x[2]), math.sin(x[2])
-    through_north, through_east = cosine * x[3] - sine * x[4], sine * x[3] + cosine * x[4]
-    K[0], K[1], K[2] = through_north + nuisance[0], through_east + nuisance[1], x[5]
-    K[3], K[4], K[5] = l[0], l[1], l[2]
-    for j in range(S.shape[1]):
-        dK[0, j] = cosine * S[3, j] - sine * S[4, j] - through_east * S[2, j]
-        dK[1, j] = sine * S[3, j] + cosine * S[4, j] + through_north * S[2, j]
-        dK[2, j] = S[5, j]
-    for i in range(3):
-        a, b, c = A[i, 0], A[i, 1], A[i, 2]
-        for j in range(S.shape[1]):
-            dK[3 + i, j] = a * S[3, j] + b * S[4, j] + c * S[5, j]
-        for j in range(free.size):
-            dK[3 + i, 4 + j] += B[i, free[j]]
+def rate(stage, j, A, B, turn, s2, s3, s4, s5):
+    """Time derivatives of one column's sensitivities at a stage; without the heading's, which is s5.
+
+    Args:
+        stage, j: Of Runge and Kutta (0 to 3), and the column.
+        A, B: Derivatives of accelerations by velocities (4, 3, 3), and by what the columns stand for (4, 3, columns).
+        turn: Cosine and sine of the heading, velocity through the water north and east (4, 4).
+        s2, s3, s4, s5: Sensitivities of heading, surge, sway and yaw rate there.
+    """
+    cosine, sine, north, east = turn[stage, 0], turn[stage, 1], turn[stage, 2], turn[stage, 3]
+    return (
+        cosine * s3 - sine * s4 - east * s2,
+        sine * s3 + cosine * s4 + north * s2,
+        A[stage, 0, 0] * s3 + A[stage, 0, 1] * s4 + A[stage, 0, 2] * s5 + B[stage, 0, j],
+        A[stage, 1, 0] * s3 + A[stage, 1, 1] * s4 + A[stage, 1, 2] * s5 + B[stage, 1, j],
+        A[stage, 2, 0] * s3 + A[stage, 2, 1] * s4 + A[stage, 2, 2] * s5 + B[stage, 2, j],
+    )
 
 
 @compiled
-def advance(x, S, u, p, free, nuisance, h, scratch, work):
-    """One step of Runge and Kutta of length `h` [s], in place."""
-    xs, K, total, Ss, dK, dtotal = work
-    columns = S.shape[1]
+def workspace(k, size):
+    """What `advance` writes in, of k free parameters among `size`."""
+    stages = np.zeros((4, 3, 3)), np.zeros((4, 3, 4 + k)), np.empty((4, 4))
+    return np.empty(6), np.empty(6), np.zeros(3), np.zeros((3, size)), *stages
+
+
+@compiled
+def advance(x, S, u, p, free, nuisance, h, work):
+    """One step of Runge and Kutta of length `h` [s], in place; a column goes through all four stages at once."""
+    xs, total, l, B, As, Bs, turn = work
     for i in range(6):
         xs[i], total[i] = x[i], 0.0
-        for j in range(columns):
-            Ss[i, j], dtotal[i, j] = S[i, j], 0.0
     for stage in range(4):
-        slopes(xs, Ss, u, p, free, nuisance, scratch, K, dK)
+        linearise(xs[3:], u, p, l, As[stage], B)
+        cosine, sine = math.cos(xs[2]), math.sin(xs[2])
+        north, east = cosine * xs[3] - sine * xs[4], sine * xs[3] + cosine * xs[4]
+        turn[stage, 0], turn[stage, 1], turn[stage, 2], turn[stage, 3] = cosine, sine, north, east
+        for i in range(3):
+            for j in range(free.size):
+                Bs[stage, i, 4 + j] = B[i, free[j]]
         weight = h / 6.0 if stage == 0 or stage == 3 else h / 3.0
         reach = h if stage == 2 else 0.5 * h
-        for i in range(6):
-            total[i] += weight * K[i]
-            xs[i] = x[i] + reach * K[i]
-            for j in range(columns):
-                dtotal[i, j] += weight * dK[i, j]
-                Ss[i, j] = S[i, j] + reach * dK[i, j]
+        total[0] += weight * (north + nuisance[0])
+        total[1] += weight * (east + nuisance[1])
+        total[2] += weight * xs[5]
+        xs[2] = x[2] + reach * xs[5]
+        for i in range(3):
+            total[3 + i] += weight * l[i]
+            xs[3 + i] = x[3 + i] + reach * l[i]
     for i in range(6):
         x[i] += total[i]
-        for j in range(columns):
-            S[i, j] += dtotal[i, j]
+    half, third, sixth = 0.5 * h, h / 3.0, h / 6.0
+    for j in range(S.shape[1]):
+        s2, s3, s4, s5 = S[2, j], S[3, j], S[4, j], S[5, j]
+        a0, a1, a3, a4, a5 = rate(0, j, As, Bs, turn, s2, s3, s4, s5)
+        r1 = s5 + half * a5
+        b0, b1, b3, b4, b5 = rate(1, j, As, Bs, turn, s2 + half * s5, s3 + half * a3, s4 + half * a4, r1)
+        r2 = s5 + half * b5
+        c0, c1, c3, c4, c5 = rate(2, j, As, Bs, turn, s2 + half * r1, s3 + half * b3, s4 + half * b4, r2)
+        r3 = s5 + h * c5
+        d0, d1, d3, d4, d5 = rate(3, j, As, Bs, turn, s2 + h * r2, s3 + h * c3, s4 + h * c4, r3)
+        S[0, j] += sixth * (a0 + d0) + third * (b0 + c0)
+        S[1, j] += sixth * (a1 + d1) + third * (b1 + c1)
+        S[2, j] = s2 + sixth * (s5 + r3) + third * (r1 + r2)
+        S[3, j] = s3 + sixth * (a3 + d3) + third * (b3 + c3)
+        S[4, j] = s4 + sixth * (a4 + d4) + third * (b4 + c4)
+        S[5, j] = s5 + sixth * (a5 + d5) + third * (b5 + c5)
 
 
 @compiled
-def observe(x, S, elapsed, nuisance, k, y, J):
-    """What the channels show (8,) and its derivatives J (8, 12 + k); `elapsed` is the time since the segment began."""
+def observe(x, S, elapsed, nuisance, k, here, y, J):
+    """What the channels show (8,), and of those that are `here` (8,) its derivatives J (8, 12 + k)."""
     cn, ce, gyro, compass, misalignment, scale = nuisance
     end, columns = 6 + k, S.shape[1]
     cosine, sine = math.cos(x[2]), math.sin(x[2])
@@ -80,16 +104,20 @@ def observe(x, S, elapsed, nuisance, k, y, J):
     y[0], y[1], y[2], y[5] = x[0], x[1], x[2] + compass, x[5] + gyro
     y[3], y[4] = a * x[3] + b * x[4], a * x[4] - b * x[3]
     y[6], y[7] = a * over_u + b * over_v, a * over_v - b * over_u
-    du, dv = -sine * cn + cosine * ce, -cosine * cn - sine * ce  # of the current in the body's axes, by heading
-    for j in range(columns):
-        for i in range(3):
-            J[i, 2 + j] = S[i, j]
-        J[5, 2 + j] = S[5, j]
-        J[3, 2 + j] = a * S[3, j] + b * S[4, j]
-        J[4, 2 + j] = a * S[4, j] - b * S[3, j]
-        turned_u, turned_v = S[3, j] + du * S[2, j], S[4, j] + dv * S[2, j]
-        J[6, 2 + j] = a * turned_u + b * turned_v
-        J[7, 2 + j] = a * turned_v - b * turned_u
+    for i in (0, 1, 2, 5):
+        if here[i]:
+            for j in range(columns):
+                J[i, 2 + j] = S[i, j]
+    if here[3] or here[4]:
+        for j in range(columns):
+            J[3, 2 + j] = a * S[3, j] + b * S[4, j]
+            J[4, 2 + j] = a * S[4, j] - b * S[3, j]
+    if here[6] or here[7]:
+        du, dv = -sine * cn + cosine * ce, -cosine * cn - sine * ce  # of the current in the body's axes, by heading
+        for j in range(columns):
+            turned_u, turned_v = S[3, j] + du * S[2, j], S[4, j] + dv * S[2, j]
+            J[6, 2 + j] = a * turned_u + b * turned_v
+            J[7, 2 + j] = a * turned_v - b * turned_u
     J[0, 0], J[1, 1] = 1.0, 1.0
     J[0, end], J[1, end + 1] = elapsed, elapsed
     J[6, end], J[6, end + 1] = a * cosine - b * sine, a * sine + b * cosine
@@ -134,43 +162,62 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
     H, g = np.zeros((count, width, width)), np.zeros((count, width))
     S, J, y, x = np.zeros((6, 4 + k)), np.zeros((8, width)), np.empty(8), np.empty(6)
     R, scaled = np.zeros((8, width)), np.zeros(8)  # rows and residuals with all their weights
-    scratch = np.zeros(3), np.zeros((3, 3)), np.zeros((3, p.size))
-    work = np.empty(6), np.empty(6), np.empty(6), np.empty_like(S), np.empty_like(S), np.empty_like(S)
+    here = np.zeros(8, dtype=np.bool_)
+    work = workspace(k, p.size)
     cost = 0.0
     for s in range(count):
         x[:] = starts[s]
         S[:] = 0.0
         for i in range(4):
             S[2 + i, i] = 1.0
+        rows = 0
         for n in range(bounds[s], bounds[s + 1]):
-            observe(x, S, (n - bounds[s]) * h, nuisance, k, y, J)
             for c in range(8):
-                residuals[n, c] = math.nan
-                e = measured[n, c] - y[c]
-                if weights[c] == 0.0 or math.isnan(e):
-                    scaled[c] = 0.0
-                    for j in range(width):
-                        R[c, j] = 0.0
-                    continue
-                residuals[n, c] = weights[c] * (wrap(e) if c == 2 else e)
-                loss_here, trust = rho(residuals[n, c] ** 2, loss, threshold)
-                cost += 0.5 * loss_here
-                root = math.sqrt(trust)
-                scaled[c] = root * residuals[n, c]
-                for j in range(width):
-                    R[c, j] = root * weights[c] * J[c, j]
-            gather(H[s], g[s], R, scaled)
+                here[c] = weights[c] != 0.0 and not math.isnan(measured[n, c])
+            observe(x, S, (n - bounds[s]) * h, nuisance, k, here, y, J)
+            rows, part = take(
+                measured[n], y, J, weights, here, loss, threshold, residuals[n], R, scaled, rows, H[s], g[s]
+            )
+            cost += part
             if n + 1 < bounds[s + 1]:
                 for _ in range(substeps):
-                    advance(x, S, inputs[n], p, free, nuisance, h / substeps, scratch, work)
+                    advance(x, S, inputs[n], p, free, nuisance, h / substeps, work)
                 if not math.isfinite(x.sum()):
                     return math.inf, H, g
+        R[rows:], scaled[rows:] = 0.0, 0.0
+        gather(H[s], g[s], R, scaled)
     return (cost if math.isfinite(H.sum()) else math.inf), H, g
 
 
 @compiled
+def take(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, rows, H, g):
+    """Adds what is `here` of a sample to the weighted rows R (8, w), and these to H and g whenever they are full.
+
+    Returns:
+        How many rows wait, and half the cost of the sample.
+    """
+    cost = 0.0
+    for c in range(8):
+        residuals[c] = math.nan
+        if here[c]:
+            e = measured[c] - y[c]
+            residuals[c] = weights[c] * (wrap(e) if c == 2 else e)
+            square, trust = rho(residuals[c] ** 2, loss, threshold)
+            cost += 0.5 * square
+            root = math.sqrt(trust)
+            scaled[rows] = root * residuals[c]
+            for j in range(g.size):
+                R[rows, j] = root * weights[c] * J[c, j]
+            rows += 1
+            if rows == 8:
+                gather(H, g, R, scaled)
+                rows = 0
+    return rows, cost
+
+
+@compiled
 def gather(H, g, R, e):
-    """Adds R' R (upper triangle) and R' e of eight weighted rows; all eight at once, since H is what costs time."""
+    """Adds R' R (upper triangle) and R' e of eight weighted rows; all eight at once: to load H is what costs time."""
     r0, r1, r2, r3, r4, r5, r6, r7 = R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7]
     for i in range(g.size):
         a, b, c, d = r0[i], r1[i], r2[i], r3[i]

@@ -12,7 +12,7 @@ import numpy as np
 
 from auvsim.errors import InputError
 from auvsim.identification import compiled
-from auvsim.identification.constraints import has_inertia, limits
+from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import substeps
@@ -24,7 +24,7 @@ LOSSES: tuple[Loss, ...] = ("squares", "huber", "cauchy")
 # Deviations about the smoothed state at which a segment's first state is held, so that one that a short segment does
 # not show stays where a vehicle can be; hundreds of times wider than what is measured.
 _FIRST = np.array([100.0, 100.0, 1.0, 1.0, 1.0, 1.0])
-_DAMPING = 1e-6  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
+_DAMPING = 1e-3  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -32,12 +32,12 @@ class SegmentOptions:
     """How segments are cut and weighed."""
 
     length: float = 5.0  # of a segment [s]; infinite: each record is one
-    schedule: tuple[float, ...] = (1.0,)  # shorter ones that are fitted before [s]
     nuisances: Nuisances = field(default_factory=Nuisances)
     loss: Loss = "squares"
     threshold: float = 2.5  # of a robust loss, in deviations
     signs: bool = False  # keeps the parameters of constraints.SIGNS on their side of zero
     prior: float | None = None  # weak prior: the start, with this relative deviation
+    believed: tuple[str, ...] | None = None  # parameters that it holds; None: all
     max_iterations: int = 50
     tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
 
@@ -98,10 +98,7 @@ class Problem:
             if record.current is not None:
                 self._expected[r, :2] = record.current
         self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
-        self._prior = np.zeros(len(free))
-        if options.prior is not None:
-            reach = options.prior * np.abs(self._vector[self.indices])
-            self._prior = np.where(reach > 0.0, 1.0 / np.where(reach > 0.0, reach, 1.0) ** 2, 0.0)
+        self._prior = prior_information(self._vector[self.indices], free, options.prior, options.believed)
         self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
         self.nuisances[:, 2:] = 0.0
 
@@ -174,7 +171,7 @@ class Problem:
 
 
 def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | None = None) -> tuple[Point, int, bool]:
-    """Levenberg and Marquardt's way down, on unknowns in units of their own curvature.
+    """Levenberg and Marquardt's way down, on unknowns in units of their own curvature, damped as by Nielsen (1999).
 
     Args:
         problem: Whose cost it is.
@@ -185,13 +182,15 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
     Returns:
         The lowest point, the iterations, and whether no step would lower the cost any more.
     """
-    damping = _DAMPING
+    damping, growth = _DAMPING, 2.0
     low, high = problem.low, problem.high
     if fixed is not None:
         low, high = np.where(fixed, point.values, low), np.where(fixed, point.values, high)
+    if not np.isfinite(point.cost):
+        return point, 0, False
     for iteration in range(1, problem.options.max_iterations + 1):
         H, g, backs = problem.reduced(point, damping)
-        step = _solved(H, g, damping, low - point.values, high - point.values)
+        step = bounded_step(H, g, damping, low - point.values, high - point.values)
         eliminated = sum(np.sum(g[:, :6] * back[:, :, -1]) for (_, g), back in zip(point.folds, backs, strict=True))
         gain = 0.5 * float(g @ step + eliminated)
         trial = problem.moved(point, step, backs)
@@ -199,35 +198,15 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
         if not trial.cost < point.cost:
             if last or damping > 1e12:
                 return point, iteration, last
-            damping *= 10.0
+            damping, growth = damping * growth, 2.0 * growth
             continue
         if last:
             return trial, iteration, True
-        if point.cost - trial.cost > 0.5 * gain:
-            damping = max(0.1 * damping, 1e-12)
+        ratio = (point.cost - trial.cost) / gain
+        least = 0.1 if abs(ratio - 1.0) < 0.1 else 1.0 / 3.0  # faster where the sum of squares is all but quadratic
+        damping, growth = max(damping * max(least, 1.0 - (2.0 * ratio - 1.0) ** 3), 1e-9), 2.0
         point = trial
     return point, problem.options.max_iterations, False
-
-
-def _solved(H: Array, g: Array, damping: float, low: Array, high: Array) -> Array:
-    """The damped step of equations scaled to a unit diagonal, its parts kept between limits (k,) where there are.
-
-    What would cross its limit stops there, and the rest is solved again.
-    """
-    diagonal = np.diag(H).copy()
-    scale = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
-    part = H / np.outer(scale, scale) + damping * np.eye(len(g))
-    low, high = (np.concatenate([side, np.full(len(g) - len(side), e)]) for side, e in ((low, -np.inf), (high, np.inf)))
-    step, loose = np.zeros(len(g)), diagonal > 0.0
-    while loose.any():
-        rest = g / scale - part @ np.where(loose, 0.0, step * scale)
-        step[loose] = np.linalg.lstsq(part[np.ix_(loose, loose)], rest[loose], rcond=1e-14)[0] / scale[loose]
-        crossing = loose & ((step < low) | (step > high))
-        if not crossing.any():
-            break
-        step[crossing] = np.clip(step, low, high)[crossing]
-        loose &= ~crossing
-    return step
 
 
 def _cut(record: Record, length: float, states: Array) -> _Cut:

@@ -4,20 +4,23 @@ Model errors and noise of the process cannot grow over a whole record, and from 
 is fitted is the motion over some seconds (multiple shooting without continuity).
 """
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from auvsim.errors import InputError
-from auvsim.identification.fit import DEFAULT_FREE, MASSES, Fit, check, invert, residual_summary, with_values
-from auvsim.identification.least_squares import regress
+from auvsim.identification.fit import DEFAULT_FREE, Fit, check, invert, residual_summary, with_values
+from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.segment_problem import LOSSES, Point, Problem, SegmentOptions, minimise
 from auvsim.identification.states import smoothed
 from estimators.planar_model import PlanarParameters
 from estimators.types import Array
 
-_ROUGH = 1.0  # `tolerance` of the shorter segments that come first
+_UNLIKELY = 5.0  # deviations of chi-square beyond which the lowest point from the start may not be the lowest of all
+_LONGER = 4.0  # times longer segments have other false bottoms: they fail from one start in 50, and not from the same
+_FROM_WHOLE = 20.0  # segments from which a fit of whole records may start [s]
 
 
 def fit_segments(
@@ -26,9 +29,11 @@ def fit_segments(
     free: Sequence[str] = DEFAULT_FREE,
     options: SegmentOptions | None = None,
 ) -> Fit:
-    """Fits the free parameters to all records at once, from the start or from least squares, whichever is nearer.
+    """Fits the free parameters to all records at once.
 
-    The covariance is that of Gauss and Newton, for the deviations that the records believe.
+    It goes down from the start. Where that does not converge, or ends higher than the sensors' noise explains, it goes
+    down from least squares too, then from a fit of other segments, and keeps the lowest end. The covariance is that of
+    Gauss and Newton, for the deviations that the records believe.
 
     Raises:
         InputError: Records, names or options that cannot be used.
@@ -36,33 +41,56 @@ def fit_segments(
     options = options or SegmentOptions()
     check(records, start)
     _check_options(options)
-    deviations = options.nuisances.vector()
-    states = [smoothed(record, start, deviations) for record in records]
-    lengths = [*(length for length in options.schedule if length < options.length), options.length]
-    problem = Problem(records, start, free, options, lengths[0], states)
-    point = _begin(problem, states)
-    iterations, converged = 0, False
-    for length in lengths:
-        if length != lengths[0]:
-            problem = Problem(records, start, free, options, length, states)
-            point = problem.at(point.values, point.nuisances, [cut.held for cut in problem.cuts])
-        tolerance = options.tolerance if length == options.length else max(_ROUGH, options.tolerance)
-        point, used, converged = minimise(problem, point, tolerance)
-        iterations += used
+    states = [smoothed(record, start, options.nuisances.vector()) for record in records]
+    problem = Problem(records, start, free, options, options.length, states)
+    point, iterations, converged = _lowest(problem, states)
+    if not np.isfinite(point.cost):
+        raise InputError(f"record {records[0].name}: the model runs away from the start; give it shorter segments")
     return _report(problem, point, iterations, converged)
 
 
-def _begin(problem: Problem, states: Sequence[Array]) -> Point:
-    """The better of the start and of what least squares make of the smoothed states."""
+def _lowest(problem: Problem, states: Sequence[Array]) -> tuple[Point, int, bool]:
+    """The lowest end from several starts, all their iterations, and whether it converged.
+
+    No more are tried once noise explains an end, or two starts have come to the same.
+    """
+    point, iterations, converged = _down(problem, problem.start.vector()[problem.indices])
+    others = _other_starts(problem, states)
+    while not converged or _unlikely(point):
+        values, before = next(others, (None, 0))
+        if values is None:
+            break
+        other, used, ended = _down(problem, values)
+        iterations += before + used
+        same = converged and ended and abs(other.cost - point.cost) < problem.options.tolerance
+        if other.cost < point.cost + (problem.options.tolerance if ended else 0.0):
+            point, converged = other, ended
+        if same:
+            break
+    return point, iterations, converged
+
+
+def _other_starts(problem: Problem, states: Sequence[Array]) -> Iterator[tuple[Array, int]]:
+    """Values (k,) of the free parameters from which to go down, and the iterations that they took."""
+    options, records = problem.options, [cut.record for cut in problem.cuts]
+    values = first_values(records, states, problem.start, problem.free)
+    yield values, 0
+    length = _LONGER * options.length if math.isfinite(options.length) else _FROM_WHOLE
+    point, used, _ = _down(Problem(records, problem.start, problem.free, options, length, states), values)
+    yield point.values, used
+
+
+def _down(problem: Problem, values: Array) -> tuple[Point, int, bool]:
+    """Down from values (k,) of the free parameters; see `minimise`."""
     held = [cut.held for cut in problem.cuts]
-    own = problem.start.vector()[problem.indices]
-    point = problem.at(np.clip(own, problem.low, problem.high), problem.nuisances, held)
-    if any(name in MASSES for name in problem.free):
-        return point
-    records = [cut.record for cut in problem.cuts]
-    values, *_ = regress(records, states, problem.start, problem.indices)
-    other = problem.at(np.clip(values, problem.low, problem.high), problem.nuisances, held)
-    return other if other.cost < point.cost else point
+    first = problem.at(np.clip(values, problem.low, problem.high), problem.nuisances, held)
+    return minimise(problem, first, problem.options.tolerance)
+
+
+def _unlikely(point: Point) -> bool:
+    """Whether the sum of squares is more than noise of the size believed would leave in any but one of a million."""
+    samples = sum(int(np.isfinite(e).sum()) for e in point.residuals)
+    return 2.0 * point.cost > samples + _UNLIKELY * math.sqrt(2.0 * samples)
 
 
 def profile(
@@ -96,8 +124,8 @@ def profile(
 def _check_options(options: SegmentOptions) -> None:
     if options.loss not in LOSSES:
         raise InputError(f"no loss '{options.loss}'; there are {', '.join(LOSSES)}")
-    if not (options.length > 0.0 and all(0.0 < length < np.inf for length in options.schedule)):
-        raise InputError(f"segments of {options.length} s after {options.schedule} s; lengths must be positive")
+    if not options.length > 0.0:
+        raise InputError(f"segments of {options.length} s; their length must be positive")
     if options.prior is not None and not options.prior > 0.0:
         raise InputError(f"a weak prior of relative deviation {options.prior}; it must be positive, or None")
 
@@ -108,8 +136,9 @@ def _report(problem: Problem, point: Point, iterations: int, converged: bool) ->
     covariance = invert(information)
     own = np.zeros_like(point.nuisances)
     own[problem.active] = np.sqrt(np.diag(covariance)[k:])
-    first = problem.at(problem.start.vector()[problem.indices], point.nuisances, [cut.held for cut in problem.cuts])
-    first, _, _ = minimise(problem, first, problem.options.tolerance, np.ones(k, dtype=bool))
+    first = problem.at(problem.start.vector()[problem.indices], point.nuisances, point.starts)
+    # From the fit's first states one step is all but the lowest, and where it is not the start is far off in any case.
+    first, _, _ = minimise(problem, first, max(problem.options.tolerance, first.cost), np.ones(k, dtype=bool))
     rms, white = residual_summary(point.residuals)
     limit = "" if converged else f"stopped after {iterations} iterations before it had converged"
     return Fit(

@@ -68,12 +68,25 @@ def case(name: str) -> Case:
     )
 
 
-def coverage(name: str, seed: int, duration: float = 300.0) -> Array:
-    """Errors of a fit's free parameters (k,) in units of its own deviations."""
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Covered:
+    """A fit beside the truth."""
+
+    scores: Array  # (k,) errors of the free parameters in units of the fit's own deviations
+    converged: bool
+
+
+def coverage(name: str, seed: int, duration: float = 300.0) -> Covered:
+    """A fit from a start of which each parameter is wrong by up to a half, as the seed draws it."""
     truth = case(name)
     run = simulate(truth.vessel(), "multisine", seed, duration)
-    fit = fit_segments([run.record], truth.parameters, truth.free, OPTIONS)
-    return (fit.values - truth.values) / fit.deviations
+    fit = fit_segments([run.record], _wrong(truth, seed), truth.free, OPTIONS)
+    return Covered(scores=(fit.values - truth.values) / fit.deviations, converged=fit.converged)
+
+
+def _wrong(truth: Case, seed: int) -> PlanarParameters:
+    wrong = truth.values * np.random.default_rng(seed).uniform(0.5, 1.5, len(truth.free))
+    return with_values(truth.parameters, truth.free, wrong)
 
 
 def convergence(seed: int, factor: float, duration: float = 300.0) -> float:
@@ -99,7 +112,7 @@ class Noisy:
     polished: float  # median error of identifiable combinations, prediction error [relative]
     output: float  # that of output-error fitting
     worst_output: float  # the largest of those
-    inside: Array  # (k,) errors of the polished parameters in deviations
+    covered: Covered  # the polished parameters beside the truth
     nees: float  # of the filter with fitted parameters and noise, a degree of freedom
 
 
@@ -109,11 +122,10 @@ def noisy(seed: int, duration: float = 300.0) -> Noisy:
     run = simulate(truth.vessel(NOISE), "multisine", seed, duration)
     whole = SegmentOptions(nuisances=SHEETS, length=math.inf)
     output = fit_segments([run.record], truth.parameters, truth.free, whole)
-    wrong = truth.values * np.random.default_rng(seed).uniform(0.5, 1.5, len(truth.free))
-    start = with_values(truth.parameters, truth.free, wrong)
+    start = _wrong(truth, seed)
     rough = fit_segments([run.record], start, truth.free, OPTIONS)
-    better = rough.parameters if rough.converged else start
-    polished = fit_prediction_error([run.record], better, truth.free, PredictionErrorOptions(nuisances=SHEETS))
+    options, guess = PredictionErrorOptions(nuisances=SHEETS), rough.parameters if rough.converged else None
+    polished = fit_prediction_error([run.record], start, truth.free, options, guess=guess)
     size = sizes(polished)
     known = np.array([c.weights for c in assess(polished).combinations if c.deviation <= WEAK])
     errors = [np.abs(known @ ((fit.values - truth.values) / size)) for fit in (polished, output)]
@@ -121,7 +133,7 @@ def noisy(seed: int, duration: float = 300.0) -> Noisy:
         polished=float(np.median(errors[0])),
         output=float(np.median(errors[1])),
         worst_output=float(np.max(errors[1])),
-        inside=(polished.values - truth.values) / polished.deviations,
+        covered=Covered(scores=(polished.values - truth.values) / polished.deviations, converged=polished.converged),
         nees=filter_nees(polished, run.record, run.states),
     )
 
@@ -170,9 +182,9 @@ def run_study(
         return {name: [future.result() for future in row] for name, row in futures.items()}
 
 
-def share_inside(scores: Sequence[Array]) -> tuple[int, int]:
-    """How many errors, in deviations, lie inside their 95 % interval, and of how many."""
-    together = np.abs(np.concatenate(list(scores)))
+def share_inside(fits: Sequence[Covered]) -> tuple[int, int]:
+    """How many errors lie inside their 95 % interval, and of how many; fits that have not converged count too."""
+    together = np.abs(np.concatenate([fit.scores for fit in fits]))
     return int(np.sum(together <= 1.96)), together.size
 
 
@@ -183,8 +195,7 @@ def table(study: dict[str, list[Any]]) -> Table:
         result.add_column(heading)
     for name in ("remus100", "prestero"):
         rows = study[f"coverage {name}"]
-        found = f"{_share(*share_inside(rows))} of {len(rows)} seeds x {len(rows[0])}"
-        result.add_row(f"parameters inside their 95 % interval, {name}", found, "90 to 99 %")
+        result.add_row(f"parameters inside their 95 % interval, {name}", _covered(rows), "90 to 99 %")
     for name, text in (("starts", "starts wrong by a factor of 5"), ("zero", "from zero")):
         good = sum(value < 0.1 for value in study[name])
         found = f"{good} of {len(study[name])}, worst {max(study[name]):.1g} deviations off"
@@ -194,7 +205,7 @@ def table(study: dict[str, list[Any]]) -> Table:
     worst = f"{100.0 * float(np.median([row.worst_output for row in rows])):.0f} %"
     result.add_row("noise of the process: median error, prediction error", _percent([r.polished for r in rows]), "10 %")
     result.add_row("the same, output error (worst combination)", f"{_percent([r.output for r in rows])} ({worst})", "")
-    result.add_row("parameters inside their 95 % interval", _share(*share_inside([r.inside for r in rows])), "")
+    result.add_row("parameters inside their 95 % interval", _covered([r.covered for r in rows]), "")
     values = [row.nees for row in rows]
     found = f"{np.mean(values):.2f} (single records {min(values):.2f} to {max(values):.2f})"
     result.add_row("NEES a degree of freedom", found, "0.8 to 1.3")
@@ -219,6 +230,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def _percent(values: Sequence[float]) -> str:
     return f"{100.0 * float(np.median(values)):.1f} % (at most {100.0 * max(values):.1f})"
+
+
+def _covered(fits: Sequence[Covered]) -> str:
+    lost = sum(not fit.converged for fit in fits)
+    return f"{_share(*share_inside(fits))} of {len(fits)} seeds x {len(fits[0].scores)}, {lost} not converged"
 
 
 def _share(successes: int, trials: int) -> str:

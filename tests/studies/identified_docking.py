@@ -18,6 +18,7 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import Progress
 from rich.table import Table
 
@@ -31,6 +32,10 @@ from estimators.planar_model import PlanarParameters
 
 MODELS = ("condensed", "identified", "wrong")
 WRONG = 0.2
+SHOWN = (  # quantity, phase and unit
+    ("position", "all", "m"), ("position", "approach", "m"), ("position", "final", "m"),
+    ("velocity", "all", "m/s"), ("current", "all", "m/s"),
+)  # fmt: skip
 VEHICLE, SPEED = "remus100", 1.0  # at which the default trial condenses [m/s]
 
 
@@ -66,14 +71,15 @@ def run_one(model: str, identified: Path, seed: int, trial: int) -> Summary:
             believed = str(identified)
         elif model == "wrong":
             believed = str(Path(folder) / "wrong.yaml")
-            planar_sets.write(_set(wrong(seed, trial)), Path(believed))
+            planar_sets.write(model_set(wrong(seed, trial)), Path(believed))
         plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": believed}})
         return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
 
 
-def _set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
+def model_set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
+    """A file's content of parameters that were not identified."""
     return planar_sets.PlanarSet(
-        vehicle=VEHICLE, speed=SPEED, method="condensed, wrong by 20 %", start="-", version="-", sources=(),
+        vehicle=VEHICLE, speed=SPEED, method="made up", start="-", version="-", sources=(),
         parameters=planar_sets.coefficients(parameters, {}),
     )  # fmt: skip
 
@@ -108,22 +114,32 @@ def run_study(
         return {model: tuple(future.result() for future in row) for model, row in futures.items()}
 
 
-def squares(summaries: Sequence[Summary], phase: str = "all") -> np.ndarray:
-    """Of each trial the number of estimates and the sum of their squared position errors (n, 2) [1, m2]."""
+def squares(summaries: Sequence[Summary], quantity: str = "position", phase: str = "all") -> np.ndarray:
+    """Of each trial the number of estimates and the sum of their squared errors of a quantity (n, 2)."""
     found = [s.estimate.get(phase) for s in summaries]
-    rows = [(q.samples, q.samples * q.position_rms**2) if q and q.position_rms is not None else (0, 0.0) for q in found]
+    values = [getattr(q, f"{quantity}_rms") if q else None for q in found]
+    rows = [
+        (q.samples, q.samples * value**2) if q and value is not None else (0, 0.0)
+        for q, value in zip(found, values, strict=True)
+    ]
     return np.array(rows, dtype=float).reshape(-1, 2)
 
 
 def rms(rows: np.ndarray) -> float:
-    """Over all estimates of trials, which weigh alike [m]."""
+    """Over all estimates of trials, which weigh alike."""
     count, total = rows.sum(axis=0)
     return math.sqrt(total / count) if count else math.nan
 
 
-def ratio(ours: Sequence[Summary], theirs: Sequence[Summary], phase: str = "all", draws: int = 2000) -> Ratio:
+def ratio(
+    ours: Sequence[Summary],
+    theirs: Sequence[Summary],
+    quantity: str = "position",
+    phase: str = "all",
+    draws: int = 2000,
+) -> Ratio:
     """Ratio of rms errors, with an interval by drawing trials again in pairs (Efron 1979)."""
-    a, b = squares(ours, phase), squares(theirs, phase)
+    a, b = squares(ours, quantity, phase), squares(theirs, quantity, phase)
     generator = np.random.default_rng(0)
     picks = generator.integers(0, len(a), (draws, len(a)))
     drawn = [rms(a[pick]) / rms(b[pick]) for pick in picks]
@@ -132,29 +148,26 @@ def ratio(ours: Sequence[Summary], theirs: Sequence[Summary], phase: str = "all"
 
 
 def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
-    """A row of each model, errors in all phases and in the last metres."""
+    """A row of each quantity: its rms with each model, and the identified one's by those of the others."""
     count = max(map(len, study.values()), default=0)
     result = Table(title=f"{count} docking trials, seed {seed}, the same for each model")
-    result.add_column("believed")
-    for heading in ("docked", "position rms [m]", "final rms [m]", "NEES", "identified by it", "final"):
+    others = [model for model in study if model != "identified" and "identified" in study]
+    for heading in ("", *study, *(f"identified by {model}" for model in others)):
         result.add_column(heading, justify="right")
-    for model, summaries in study.items():
-        nees = [(q.samples, q.nees_per_dof) for s in summaries if (q := s.estimate["all"]).nees_per_dof is not None]
-        weight = sum(n for n, _ in nees)
-        cells = [
-            str(sum(s.docked for s in summaries)),
-            f"{rms(squares(summaries)):.3f}",
-            f"{rms(squares(summaries, 'final')):.3f}",
-            f"{sum(n * value for n, value in nees) / weight:.2f}" if weight else "-",
-        ]
-        for phase in ("all", "final"):
-            if model == "identified" or "identified" not in study or not summaries:
-                cells.append("")
-                continue
-            r = ratio(study["identified"], summaries, phase)
-            cells.append(f"{r.value:.3f} ({r.low:.3f}-{r.high:.3f})")
-        result.add_row(model, *cells)
+    result.add_row("docked", *(str(sum(s.docked for s in summaries)) for summaries in study.values()))
+    for quantity, phase, unit in SHOWN:
+        values = [f"{rms(squares(summaries, quantity, phase)):.3f}" for summaries in study.values()]
+        ratios = [ratio(study["identified"], study[model], quantity, phase) for model in others]
+        label = f"{quantity}{'' if phase == 'all' else f', {phase}'}, rms [{unit}]"
+        result.add_row(escape(label), *values, *(f"{r.value:.3f} ({r.low:.3f}-{r.high:.3f})" for r in ratios))
+    result.add_row("NEES of the position", *(f"{_nees(summaries):.2f}" for summaries in study.values()))
     return result
+
+
+def _nees(summaries: Sequence[Summary]) -> float:
+    """A degree of freedom, in the mean over all estimates."""
+    found = [(q.samples, q.nees_per_dof) for s in summaries if (q := s.estimate["all"]).nees_per_dof is not None]
+    return sum(n * value for n, value in found) / sum(n for n, _ in found) if found else math.nan
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -43,7 +43,13 @@ WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
     "shaft in revolutions a minute named radians a second": (
         lambda t: renamed(t, "n [rpm]", "n [rad/s]"), "name the column `n [rpm]`"),
     "speeds in knots named metres a second": (
-        lambda t: {**t, "dvl_u [cm/s]": t["dvl_u [cm/s]"] * 3600 / 1852}, "is it in knots?"),
+        lambda t: {**t, "dvl_u [cm/s]": t["dvl_u [cm/s]"] * 3600 / 1852}, "is it in kn?"),
+    "speed through the water in cm/s named m/s": (
+        lambda t: {**t, "surge [m/s]": 100.0 * t["surge [m/s]"]}, "is it in cm/s?"),
+    "speeds in m/s named cm/s": (
+        lambda t: {**t, "dvl_u [cm/s]": 0.01 * t["dvl_u [cm/s]"]}, "is it in m/s, not in cm/s?"),
+    "shaft in radians a second named revolutions a minute": (
+        lambda t: {**t, "n [rpm]": t["n [rpm]"] * np.pi / 30.0}, "times what this shaft speed gives"),
     "constant rudder": (lambda t: {**t, "rudder [deg]": 0.0 * t["rudder [deg]"] + 5.0}, "the rudder stays at 5.0 deg"),
     "three seconds of data": (lambda t: {name: values[:30] for name, values in t.items()}, "a fit needs 20 s"),
     "twelve seconds of data": (lambda t: {name: values[:125] for name, values in t.items()}, "12 s of data"),
@@ -84,6 +90,15 @@ def test_what_is_right_passes(kind: str, tmp_path: Path) -> None:
     few = without(table, "yaw_rate", "surge", "sway", "dvl_u", "dvl_v", "north", "east")
     for number, one in enumerate((table, slow, few)):
         checks.records(read([write(tmp_path / f"{number}.csv", one)]).records, TRUE)
+
+
+@pytest.mark.parametrize("kind", ["zigzag", "turns"])
+def test_knots_through_the_water_are_told_from_a_current(kind: str, tmp_path: Path) -> None:
+    """On several headings the two surges of a log differ by the current's parts along them, and by a factor."""
+    table = columns(synthetic(5, 120.0, kind))
+    path = write(tmp_path / "knots.csv", {**table, "surge [m/s]": table["surge [m/s]"] * 3600 / 1852})
+    with pytest.raises(InputError, match=r"is it in kn\?"):
+        read([path])
 
 
 def test_a_rudder_that_follows_the_yaw_rate_is_not_reversed(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ import pytest
 
 from auvsim.errors import InputError
 from auvsim.identification import compiled
-from auvsim.identification.fit import with_values
+from auvsim.identification.fit import DEFAULT_FREE, with_values
 from auvsim.identification.prediction_error import Likelihood, PredictionErrorOptions, fit_prediction_error
 from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
@@ -115,10 +115,23 @@ def test_polish_bears_noise_that_misleads_output_errors():
     assert max(test.statistic for test in output.whiteness if test is not None) > 100.0
 
 
+def test_a_wrong_start_comes_to_the_same_optimum():
+    """All that is free by default, off by up to a half, with noise of the process: least squares may mislead there."""
+    run = noisy(8, 100.0)
+    truth = np.array([getattr(PARAMETERS, name) for name in DEFAULT_FREE])
+    start = with_values(PARAMETERS, DEFAULT_FREE, truth * np.random.default_rng(8).uniform(0.5, 1.5, len(truth)))
+    right, other = (fit_prediction_error([run.record], p, DEFAULT_FREE, OPTIONS) for p in (PARAMETERS, start))
+    assert right.converged
+    assert other.converged
+    # Both stop where a step would change the log likelihood by 1e-4, 0.014 deviations.
+    assert np.abs(other.values - right.values) / right.deviations == pytest.approx(0.0, abs=0.05)
+
+
 def test_without_noise_the_polish_agrees_with_segments():
     run = simulate(Vessel(parameters=PARAMETERS), "multisine", 4, 100.0)
     rough = fit_segments([run.record], PARAMETERS, FREE, SegmentOptions(nuisances=SHEETS, length=math.inf))
     polished = fit_prediction_error([run.record], rough.parameters, FREE, OPTIONS)
+    assert polished.converged
     # Midpoint against Runge and Kutta, 0.07 % where intervals are 0.15 %; densities that cannot be below zero.
     assert np.abs((polished.values - rough.values) / polished.deviations).max() < 1.0
     assert polished.noise is not None
