@@ -203,7 +203,9 @@ def test_a_manoeuvre_is_logged_whole(zigzag: TrialLog) -> None:
     truth, guidance = zigzag["truth"], zigzag["guidance"]
     assert truth["time"][-1] == pytest.approx(90.0, abs=1e-9)
     assert set(guidance["phase"].tolist()) == {Phase.MANOEUVRE}
-    assert zigzag["event"]["text"].tolist() == ["zigzag: approach", "zigzag"]
+    event = zigzag["event"]
+    told = event["text"][event["kind"] != "refused"].tolist()  # what the estimator refuses is by chance
+    assert told == ["zigzag: approach", "zigzag"]
     assert len(zigzag["dvl"]["time"]) == 90 * 5
     assert len(zigzag["gyro"]["time"]) == 90 * 10
     assert len(zigzag["contact"]["time"]) == 0
