@@ -101,7 +101,7 @@ def _events(playback: Playback, times: Array, shown: Array) -> list[tuple[float,
     told = [(0.0, f"start: {start.range:.0f} m from the dock, depth {start.depth:.0f} m")]
     event = playback.log["event"]
     for time, kind, text in zip(event["time"], event["kind"], event["text"], strict=True):
-        if time <= playback.end:
+        if time <= playback.end and kind != "refused":  # a refused fix is seen by its mark
             told.append((float(np.interp(time, times, shown)), f"{kind.replace('_', ' ')}: {text}"))
     return told
 
