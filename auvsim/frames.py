@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 
 FLIP = np.array([1.0, -1.0, -1.0])  # diagonal of the half turn about x
 FLIP6 = np.concatenate([FLIP, FLIP])  # the same for [linear, angular] pairs
-_HALF_TURN, _TURN = math.pi, 2 * math.pi
 FLIP_QUATERNION = np.array([1.0, 1.0, -1.0, -1.0])  # the same for quaternions wxyz
+_HALF_TURN, _TURN = math.pi, 2 * math.pi
 
 
 def flip(vector: Array) -> Array:

@@ -108,7 +108,7 @@ def mujoco_table(study: MujocoStudy) -> Table:
     table.add_column("row", no_wrap=True)
     others = [key for key in next(iter(study.results.values())) if key != paired.REFERENCE]
     judged = [key for key in paper1_products.DOTS if key in others]
-    bounded = [key for key in (paired.REFERENCE, "imm_biases") if key == paired.REFERENCE or key in others]
+    bounded = [paired.REFERENCE, *(key for key in others if key == "imm_biases")]
     brief = {key: SHORT[key].removesuffix(" biases") for key in FILTERS}
     headings = [brief[key] for key in others] + [f"NEES {brief[key]}" for key in judged]
     for heading in ("runs", "paper [m]", *headings, *(f"{brief[key]} / bound" for key in bounded)):

@@ -4,7 +4,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -14,12 +13,11 @@ from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks
 from auvsim.reproduce.paper1_mujoco_runs import Recording, Voyage, simulate, track
 from auvsim.reproduce.paper1_runs import TICK
 from auvsim.reproduce.paper1_study import AFTER, FILTERS, Result, Row, Score
+from auvsim.reproduce.paper1_yardsticks import along, mean_square
 from auvsim.scenario import Scenario
-from estimators.bounds import PosteriorBound
 from estimators.docking import PAPER_NOISE, PaperFilter
-from estimators.planar_filter import COMPASS, USBL, DockingNoise, PlanarModels
+from estimators.planar_filter import DockingNoise, PlanarModels
 from estimators.planar_model import PlanarParameters
-from estimators.types import Array
 
 # Settled rows are many short runs, because what errs there most, the compasses, errs alike throughout a run.
 SETTLED, STEADY, TURN = Voyage(duration=400.0), Voyage(), Voyage(turn=(120.0, 130.0))
@@ -157,24 +155,9 @@ def bound(row: Row[Voyage], seed: int) -> float:
     made = navigator("imm", run)
     estimator = made._estimator
     noise = _nearly_certain(estimator._filter.noise)
-    models = PlanarModels(run.parameters, noise)
-    columns = [*run.states.T, *np.zeros((len(noise.biases), len(run.times)))]
-    columns[2] = np.unwrap(columns[2])
-
-    def truths(time: float) -> Array:
-        return np.array([[np.interp(time, run.times, column) for column in columns]])
-
-    def first(nodes: Sequence[Any], index: int) -> Array | None:
-        start = models.first(nodes, index)
-        return None if start is None else start[0].covariance
-
-    sensors = {COMPASS: models.heading, USBL: models.position}
-    estimator._filter = PosteriorBound(models.process, sensors, truths, first, noise)
+    estimator._filter = along(run, PlanarModels(run.parameters, noise))
     estimator.reset()
-    followed = track(run, made)
-    begin, end = row.window
-    counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])
-    return float(np.trace(followed.covariances[counted, :2, :2], axis1=1, axis2=2).mean())
+    return mean_square(row, run, track(run, made))
 
 
 def _nearly_certain(noise: DockingNoise) -> DockingNoise:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auvsim.reproduce.paper1_runs import TICK, follow, simulate, track
+from auvsim.reproduce.paper1_runs import TICK, Track, Way, follow, simulate, track
 from auvsim.reproduce.paper1_study import FILTERS, Row
 from estimators import batch
 from estimators.bounds import PosteriorBound
@@ -28,16 +28,27 @@ def bound(row: Row, seed: int) -> float:
     """
     run = simulate(row.conditions, seed)
     models = PlanarModels(PRESTERO, REFERENCE_NOISE)
+    return mean_square(row, run, track(run, along(run, models)))
+
+
+def along(run: Way, models: PlanarModels) -> PosteriorBound:
+    """The bound of a filter of these models, given the true way of a run; constant errors are taken as zero."""
+    columns = [*run.states.T, *np.zeros((len(models.noise.biases), len(run.times)))]
+    columns[2] = np.unwrap(columns[2])
 
     def truths(time: float) -> Array:
-        return np.array([[np.interp(time, run.times, column) for column in run.states.T]])
+        return np.array([[np.interp(time, run.times, column) for column in columns]])
 
     def first(nodes: Sequence[Any], index: int) -> Array | None:
         start = models.first(nodes, index)
         return None if start is None else start[0].covariance
 
     sensors = {COMPASS: models.heading, USBL: models.position}
-    followed = track(run, PosteriorBound(models.process, sensors, truths, first, REFERENCE_NOISE))
+    return PosteriorBound(models.process, sensors, truths, first, models.noise)
+
+
+def mean_square(row: Row, run: Way, followed: Track) -> float:
+    """Mean square [m^2] of the position that a track's covariances claim, in the row's window."""
     begin, end = row.window
     counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])
     return float(np.trace(followed.covariances[counted, :2, :2], axis1=1, axis2=2).mean())
