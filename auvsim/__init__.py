@@ -1,6 +1,6 @@
 """AUV docking on exact MuJoCo hydrodynamics."""
 
-from auvsim.renderer import choose_renderer
+from auvsim.base.renderer import choose_renderer
 
 __version__ = "0.1.0"
 

@@ -24,7 +24,10 @@
 import numpy as np
 from IPython.display import Image
 
-from auvsim import log, metrics, plots, sampling, scenario, trial
+from auvsim.analysis import plots
+from auvsim.data import log
+from auvsim.missions.docking import metrics
+from auvsim.simulation import sampling, scenario, trial
 
 # %% [markdown]
 # ## One trial

@@ -27,7 +27,11 @@ from pathlib import Path
 from IPython.display import Image
 
 from auvsim.cli import reproduce
-from auvsim.reproduce import paper1, paper1_acceptance, paper1_mujoco, paper1_products, paper1_truths
+from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
+from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
+from auvsim.reproduce.paper1 import planar as paper1
+from auvsim.reproduce.paper1 import products as paper1_products
+from auvsim.reproduce.paper1 import truths as paper1_truths
 
 # %% [markdown]
 # ## The study

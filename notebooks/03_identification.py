@@ -27,11 +27,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from auvsim import log, metrics, planar_sets, sampling, scenario, trial
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
+from auvsim.data import log
 from auvsim.identification import pictures, product
 from auvsim.identification.pipeline import identify
 from auvsim.identification.readers import read
+from auvsim.missions.docking import metrics
+from auvsim.physics import planar_sets
+from auvsim.simulation import sampling, scenario, trial
 
 # %% [markdown]
 # ## Manoeuvres
@@ -140,5 +143,5 @@ for model in ("condense", "lake.yaml"):
     print(f"{model:<10} docked: {summary.docked}, position of the estimate {rms:.2f} m rms")
 
 # %% [markdown]
-# One trial proves nothing, and the condensed model is good: `python -m tests.studies.identified_docking lake.yaml` runs a hundred with each model, and with a
+# One trial proves nothing, and the condensed model is good: `python -m auvsim.studies.identified_docking lake.yaml` runs a hundred with each model, and with a
 # third one that is wrong by a fifth.

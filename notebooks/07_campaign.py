@@ -25,8 +25,9 @@ from pathlib import Path
 import numpy as np
 from IPython.display import IFrame
 
-from auvsim import metrics, scenario, trial
 from auvsim.campaign import execution, local, plan, report, statistics, table
+from auvsim.missions.docking import metrics
+from auvsim.simulation import scenario, trial
 
 # %% [markdown]
 # ## The plan

@@ -45,7 +45,7 @@ def test_version_is_the_same_everywhere() -> None:
 
 
 def test_the_printed_log_format_is_the_log_format():
-    from auvsim.log import table_markdown
+    from auvsim.data.log import table_markdown
 
     assert (ROOT / "docs" / "log_format.md").read_text() == table_markdown() + "\n"
 

@@ -16,8 +16,8 @@ from itertools import islice
 from multiprocessing.connection import wait
 from typing import Any
 
+from auvsim.base.errors import AuvsimError, InputError
 from auvsim.campaign.local import Death, Process, unpacked
-from auvsim.errors import AuvsimError, InputError
 
 AHEAD = 2  # tasks for each thread of the cluster that are under way, so that none waits for the next
 CONNECTING = 60.0  # how long to look for the scheduler and its workers [s]

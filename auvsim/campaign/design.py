@@ -8,8 +8,8 @@ from typing import Literal
 
 from scipy.stats import qmc
 
-from auvsim.frames import Array
-from auvsim.randomness import stream
+from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
 
 Sampling = Literal["independent", "latin_hypercube", "sobol"]
 CHUNK = 1024  # points of a Sobol sequence that are made at a time, a power of two

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from auvsim.base.errors import InputError
+from auvsim.base.files import whole
 from auvsim.campaign import plan as plans
 from auvsim.campaign.plan import Plan
-from auvsim.errors import InputError
-from auvsim.files import whole
 
 TOGETHER = 1000  # trials in one subfolder: file systems slow down with folders of very many files
 LOCK, PLAN, STATE = ".lock", "plan.yaml", "campaign.json"

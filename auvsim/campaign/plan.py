@@ -11,12 +11,14 @@ from typing import Any, Literal
 
 from pydantic import Field, ValidationError
 
-from auvsim import sampling, scenario, schema, yaml_text
+import auvsim
+from auvsim.base import schema, yaml_text
+from auvsim.base.errors import InputError
+from auvsim.base.settings import Settings
 from auvsim.campaign import design
-from auvsim.errors import InputError
-from auvsim.settings import Settings
+from auvsim.simulation import sampling, scenario
 
-SHIPPED = Path(__file__).parent.parent / "plans"
+SHIPPED = Path(auvsim.__file__).parent / "plans"
 ALONE = "all"  # name of the only variant of a plan that names none
 CHECKED = 100  # first trials of each variant that are drawn and checked before anything runs
 

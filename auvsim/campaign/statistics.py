@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
 from auvsim.campaign.table import UNDER_WAY
-from auvsim.frames import Array
-from auvsim.metrics import wilson
-from auvsim.randomness import stream
-from estimators.consistency import interval
+from auvsim.missions.docking.metrics import wilson
+from estimators.core.consistency import interval
 
 Row = Mapping[str, Any]  # of the table
 

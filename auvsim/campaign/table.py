@@ -11,11 +11,11 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from auvsim import yaml_text
+from auvsim.base import yaml_text
+from auvsim.base.errors import InputError
+from auvsim.base.files import whole
 from auvsim.campaign.folder import Folder, Record
-from auvsim.errors import InputError
-from auvsim.files import whole
-from auvsim.log import PHASES
+from auvsim.data.log import PHASES
 
 Row = dict[str, Any]  # by column; None where there is no value
 

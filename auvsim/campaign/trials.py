@@ -8,11 +8,12 @@ import traceback
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from auvsim import metrics, scenario
+from auvsim.base.errors import InputError
 from auvsim.campaign.task import Result, Task
-from auvsim.errors import InputError
-from auvsim.log import VERSIONS, TrialLog, pack
-from auvsim.recorder import version as installed
+from auvsim.data.log import VERSIONS, TrialLog, pack
+from auvsim.data.recorder import version as installed
+from auvsim.missions.docking import metrics
+from auvsim.simulation import scenario
 
 WARM_UP = 30.0  # simulated time in which all is called, and so compiled, that a whole trial calls [s]
 ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")  # of an object in memory: other in every process
@@ -56,8 +57,9 @@ def prepare(what: tuple[Sequence[Task], Mapping[str, str]]) -> str | None:
     Returns:
         What is wrong with a vehicle, dock, estimator, number or version; None if nothing is.
     """
-    from auvsim import fluid, navigation
-    from auvsim.trial import Loop
+    from auvsim.navigation import navigator as navigation
+    from auvsim.physics import fluid
+    from auvsim.simulation.trial import Loop
 
     tasks, wanted = what
     for package, version in versions().items():
@@ -101,7 +103,7 @@ def versions() -> dict[str, str]:
 
 
 def _simulate(values: Mapping, seed: int, trial: int, duration: float | None = None) -> TrialLog:
-    from auvsim.trial import run_trial
+    from auvsim.simulation.trial import run_trial
 
     parsed = scenario.parse(values)
     if duration is not None:

@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import tyro
 
 from auvsim import __version__
-from auvsim.errors import AuvsimError, InputError
+from auvsim.base.errors import AuvsimError, InputError
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
 

@@ -7,12 +7,12 @@ from typing import Literal
 from rich.console import Console
 from rich.table import Table
 
-from auvsim import scenario
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.campaign import cluster, execution, folder, local, plan, statistics, table
 from auvsim.campaign.folder import Folder
 from auvsim.cli import dock
 from auvsim.cli.report import CampaignProgress
-from auvsim.errors import InputError, unknown_name
+from auvsim.simulation import scenario
 
 SHOWN = ("variant", "trial", "error_type", *statistics.RATES, *statistics.MEANS)  # columns that the command needs
 WIDTH = 120  # of what is printed where there is no terminal [columns]

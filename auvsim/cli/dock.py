@@ -6,10 +6,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
+from auvsim.base.errors import InputError
 from auvsim.cli import products, report
-from auvsim.errors import InputError
-from auvsim.log import TrialLog, write
-from auvsim.scenario import Scenario
+from auvsim.data.log import TrialLog, write
+from auvsim.simulation.scenario import Scenario
 
 PRODUCTS = ("summary.json", "track.png", "estimates.png", "docking.mp4")  # made from trial.nc
 
@@ -73,8 +73,8 @@ def output_folder(path: Path) -> Iterator[None]:
 
 def simulate(scenario: Scenario, seed: int, trial: int, name: str = "docking") -> TrialLog:
     """Runs one trial with a progress bar of that name; says so if it has to compile first."""
-    from auvsim import fluid
-    from auvsim.trial import run_trial
+    from auvsim.physics import fluid
+    from auvsim.simulation.trial import run_trial
 
     if not fluid.is_warm():
         # A short trial calls, and so compiles, all that a long one does.

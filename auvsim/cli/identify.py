@@ -9,14 +9,14 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from auvsim import planar_sets
+from auvsim.base.errors import InputError
 from auvsim.cli import report
 from auvsim.cli.dock import COMPILING, output_folder
-from auvsim.errors import InputError
 from auvsim.identification import compiled, product
 from auvsim.identification import report as page
 from auvsim.identification.pipeline import STEPS, Identification, identify
 from auvsim.identification.readers import read
+from auvsim.physics import planar_sets
 
 PARAMETERS = "parameters.yaml"
 MANY = 8  # notes that are printed; the report has all

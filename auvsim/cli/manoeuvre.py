@@ -4,12 +4,14 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from auvsim import manoeuvre_metrics, sampling, schema
+from auvsim.base import schema
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.cli import dock, options, products, report
-from auvsim.errors import InputError, unknown_name
-from auvsim.log import write
-from auvsim.manoeuvre_settings import ManoeuvreSettings, OptimalSettings
-from auvsim.scenario import Scenario
+from auvsim.data.log import write
+from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
+from auvsim.missions.manoeuvres.settings import ManoeuvreSettings, OptimalSettings
+from auvsim.simulation import sampling
+from auvsim.simulation.scenario import Scenario
 
 KINDS = tuple(model.model_fields["kind"].default for model in schema.members(ManoeuvreSettings))
 
@@ -74,7 +76,7 @@ def run(plans: Mapping[str, Scenario], *, seed: int, trial: int, out: Path) -> i
 
 def _ready(plans: Mapping[str, Scenario], seed: int, trial: int) -> dict[str, Scenario]:
     """The same plans, each known to run, an optimal manoeuvre designed; nothing is written before."""
-    from auvsim.trial import Loop
+    from auvsim.simulation.trial import Loop
 
     for plan in plans.values():
         if not isinstance(plan.manoeuvre, OptimalSettings):
@@ -87,11 +89,11 @@ def _ready(plans: Mapping[str, Scenario], seed: int, trial: int) -> dict[str, Sc
 
 def _designed(plan: Scenario, settings: OptimalSettings, seed: int) -> Scenario:
     """The plan with the manoeuvre designed on the model condensed at its speed; prints what to expect of it."""
-    from auvsim import library
-    from auvsim.condense import condense
     from auvsim.identification import excitation, information
+    from auvsim.physics.planar_fit import fit_planar_model
+    from auvsim.vehicles import library
 
-    model = condense(plan.vehicle.model, settings.speed, plan.world.water_density)
+    model = fit_planar_model(plan.vehicle.model, settings.speed, plan.world.water_density)
     vehicle = library.vehicle(plan.vehicle.model)
     if model.shaft_speed_for(settings.fastest) > vehicle.shaft_limit:
         text = f"the shaft of '{vehicle.name}' cannot hold {settings.fastest:g} m/s"

@@ -5,9 +5,10 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
 
-from auvsim import sampling, schema, yaml_text
-from auvsim.errors import InputError
-from auvsim.scenario import Scenario, parse
+from auvsim.base import schema, yaml_text
+from auvsim.base.errors import InputError
+from auvsim.simulation import sampling
+from auvsim.simulation.scenario import Scenario, parse
 
 PLACE = "command line"
 

@@ -5,16 +5,18 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from auvsim.errors import InputError
-from auvsim.files import whole
-from auvsim.log import TrialLog, read
+from auvsim.base.errors import InputError
+from auvsim.base.files import whole
+from auvsim.data.log import TrialLog, read
 
 NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `auvsim video {log}` makes it"
 
 
 def plots(log: TrialLog, folder: Path) -> None:
     """Draws track.png and estimates.png; of a manoeuvre one picture of its name."""
-    from auvsim import manoeuvre_metrics, manoeuvre_plots, manoeuvres, plots
+    from auvsim.analysis import manoeuvre_plots, plots
+    from auvsim.missions.manoeuvres import laws as manoeuvres
+    from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
     pictures = ((plots.track, "track.png"), (plots.estimates, "estimates.png"))
     if manoeuvre_metrics.is_manoeuvre(log):
@@ -50,7 +52,8 @@ def still(log: TrialLog, folder: Path, *, path: Path, time: float | None = None,
 
 def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
     """Writes summary.json and returns what it holds."""
-    from auvsim import manoeuvre_metrics, metrics
+    from auvsim.missions.docking import metrics
+    from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
     of_manoeuvre = manoeuvre_metrics.is_manoeuvre(log)
     values = manoeuvre_metrics.summary(log) if of_manoeuvre else metrics.summarise(log).to_dict()
@@ -61,8 +64,8 @@ def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
 
 def show_summary(log: TrialLog, folder: Path) -> None:
     """Writes summary.json and prints it as a table."""
-    from auvsim import manoeuvre_metrics
     from auvsim.cli import report
+    from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
     values = summary(log, folder)
     if manoeuvre_metrics.is_manoeuvre(log):

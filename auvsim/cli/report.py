@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
-from auvsim.manoeuvre_metrics import LABELS, Figures
+from auvsim.missions.manoeuvres.metrics import LABELS, Figures
 
 if TYPE_CHECKING:
     from auvsim.identification.excitation import Outcome

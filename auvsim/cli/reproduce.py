@@ -9,14 +9,19 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from auvsim.base.errors import InputError
 from auvsim.cli.dock import output_folder
 from auvsim.cli.report import StudyProgress
-from auvsim.errors import InputError
-from auvsim.reproduce import paired, paper1, paper1_acceptance, paper1_mujoco, paper1_products, paper1_truths
-from auvsim.reproduce.paper1_acceptance import SHORT, Verdict
-from auvsim.reproduce.paper1_mujoco import MujocoStudy
-from auvsim.reproduce.paper1_study import FILTERS, ROWS, Result
-from auvsim.reproduce.paper1_truths import DRAWN
+from auvsim.reproduce import paired
+from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
+from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
+from auvsim.reproduce.paper1 import planar as paper1
+from auvsim.reproduce.paper1 import products as paper1_products
+from auvsim.reproduce.paper1 import truths as paper1_truths
+from auvsim.reproduce.paper1.acceptance import SHORT, Verdict
+from auvsim.reproduce.paper1.mujoco import MujocoStudy
+from auvsim.reproduce.paper1.study import FILTERS, ROWS, Result
+from auvsim.reproduce.paper1.truths import DRAWN
 
 WIDTH = 150  # of the widest table [columns]
 LEGEND = (

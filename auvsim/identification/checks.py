@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification.columns import Meaning
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signals
-from estimators.errors import ParameterError
-from estimators.planar_filter import steady_surge
-from estimators.planar_model import MAX_SUBSTEP, PlanarParameters, PlanarProcess
-from estimators.types import Array
+from estimators.core.errors import ParameterError
+from estimators.core.types import Array
+from estimators.docking.models import steady_surge
+from estimators.planar.model import MAX_SUBSTEP, PlanarParameters, PlanarProcess
 
 LEAST = 20.0  # of data in all: the vehicle's surge alone takes some 10 s to settle [s]
 SPIN = 1.0  # a turn this fast is none of a vehicle's [rad/s]

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
-from auvsim import yaml_text
-from auvsim.errors import InputError, unknown_name
-from auvsim.settings import Settings
+from auvsim.base import yaml_text
+from auvsim.base.errors import InputError, unknown_name
+from auvsim.base.settings import Settings
 
 _DEG = math.pi / 180.0
 UNITS: dict[str, dict[str, float]] = {  # by kind of quantity; the first is SI, the one taken where none is given

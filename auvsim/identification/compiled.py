@@ -14,10 +14,10 @@ import casadi as ca
 import numba
 
 from auvsim.identification import filter_loops, information_loops, segment_loops
-from estimators import loops
-from estimators.compiling import is_ready, load
-from estimators.kernels import python_source
-from estimators.planar_model import PARAMETER_NAMES, accelerations, step_function
+from estimators.core import loops
+from estimators.core.compiling import is_ready, load
+from estimators.core.kernels import python_source
+from estimators.planar.model import PARAMETER_NAMES, accelerations, step_function
 
 
 @lru_cache
@@ -56,5 +56,6 @@ def _linearise() -> str:
 def _load(name: str, model: str, *behind: ModuleType) -> ModuleType:
     loops_hash = hashlib.sha256(inspect.getsource(loops).encode()).hexdigest()[:16]
     comment = f"# Machine code made of this depends on Python {platform.python_version()}, numba {numba.__version__}"
-    head = f"{comment}, loops {loops_hash}.\nimport math\n\nfrom estimators.compiling import compiled\n\n\n@compiled\n"
+    imports = "import math\n\nfrom estimators.core.compiling import compiled"
+    head = f"{comment}, loops {loops_hash}.\n{imports}\n\n\n@compiled\n"
     return load(name, head + "\n\n".join((model, *map(inspect.getsource, behind))))

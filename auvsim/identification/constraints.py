@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 # Drag, cross-flow and lift along and about the vehicle's own axes lose energy; a propeller ahead pushes ahead, less so
 # with speed. Couplings (Y_rr, N_vv, Y_ur, N_uv) and the rudder's place may have either sign.

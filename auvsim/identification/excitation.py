@@ -12,11 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim import manoeuvres
-from auvsim.errors import InputError
-from auvsim.frames import Array
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
 from auvsim.identification.information import STEP, Experiment, Progressed
-from auvsim.manoeuvre_settings import (
+from auvsim.missions.manoeuvres import laws as manoeuvres
+from auvsim.missions.manoeuvres.settings import (
     CircleSettings,
     ManoeuvreSettings,
     MultisineSettings,
@@ -28,7 +29,6 @@ from auvsim.manoeuvre_settings import (
     TableSettings,
     ZigzagSettings,
 )
-from auvsim.randomness import stream
 
 LEVELS = np.array([-1.0, -0.5, 0.0, 0.5, 1.0])  # rudders among which the design chooses, of the largest
 SPEED_DWELLS = 10  # for how many times the dwell of the rudder a speed is asked for: surge takes some 10 s to follow

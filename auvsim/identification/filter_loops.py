@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimators.compiling import compiled
-from estimators.loops import factor, propagate, solve, wrap
+from estimators.core.compiling import compiled
+from estimators.core.loops import factor, propagate, solve, wrap
 
 STATES = 12
 

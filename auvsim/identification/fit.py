@@ -7,12 +7,12 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim.errors import InputError, unknown_name
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.identification.constraints import has_inertia, inertia
 from auvsim.identification.records import MEASURED, Record
-from estimators.consistency import Whiteness, ljung_box
-from estimators.planar_model import PARAMETER_NAMES, PlanarParameters
-from estimators.types import Array
+from estimators.core.consistency import Whiteness, ljung_box
+from estimators.core.types import Array
+from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
 
 Indices = NDArray[np.intp]
 Mask = NDArray[np.bool_]

@@ -6,14 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auvsim.errors import InputError, unknown_name
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.identification import prediction_error, segments
 from auvsim.identification.fit import Fit
 from auvsim.identification.prediction_error import PredictionErrorOptions
 from auvsim.identification.records import Record
 from auvsim.identification.segments import SegmentOptions
-from estimators.consistency import chi_square
-from estimators.types import Array
+from estimators.core.consistency import chi_square
+from estimators.core.types import Array
 
 WEAK = 0.5  # relative deviation beyond which a parameter, or a combination, is not known
 TIED = 0.95  # correlation beyond which two parameters go together

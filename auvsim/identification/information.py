@@ -10,13 +10,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvsim.errors import InputError
-from auvsim.frames import Array
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array
 from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, Nuisances, free_indices
-from auvsim.scenario import SensorSettings
-from estimators.compiling import is_ready
-from estimators.planar_model import PlanarParameters
+from auvsim.simulation.scenario import SensorSettings
+from estimators.core.compiling import is_ready
+from estimators.planar.model import PlanarParameters
 
 STEP = 0.1  # of the model, and of inputs [s]
 FIRST = (1.0, 1.0, 1.0, 1.0, 0.3, 0.3)  # deviations of the first north, east [m], heading [rad], u, v [m/s], r [rad/s]

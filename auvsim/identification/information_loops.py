@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimators.compiling import compiled
+from estimators.core.compiling import compiled
 
 if TYPE_CHECKING:
     from auvsim.identification.segment_loops import advance, observe, workspace

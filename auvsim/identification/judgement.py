@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification.checks import STILL
 from auvsim.identification.fit import Nuisances
 from auvsim.identification.prediction import Prediction, predict
 from auvsim.identification.records import Record
 from auvsim.identification.states import smoothed
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 HORIZON = 120.0  # of a prediction [s]
 LEAD = 60.0  # of the first; what a filter on the judged model needs to find the current and its sensors' biases [s]

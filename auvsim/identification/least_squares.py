@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification import compiled
 from auvsim.identification.fit import (
     DEFAULT_FREE,
@@ -19,8 +19,8 @@ from auvsim.identification.fit import (
 )
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.states import smoothed
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 # Quadratic in what is hardly seen: with errors in the smoothed sway least squares give them wild values of either sign.
 _WILD = ("X_dd", "Y_vv", "Y_rr", "N_vv", "N_rr")

@@ -5,14 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from auvsim import library, manoeuvres, scenario
-from auvsim.allocation import Allocation
-from auvsim.errors import InputError
-from auvsim.guidance import Phase
+from auvsim.base.errors import InputError
+from auvsim.data.log import TrialLog, read
 from auvsim.identification.signals import MARGIN, Signal, Signals, steep, stretches
-from auvsim.log import TrialLog, read
-from auvsim.metrics import fixes
-from estimators.types import Array
+from auvsim.missions.docking.guidance import Phase
+from auvsim.missions.docking.metrics import fixes
+from auvsim.missions.manoeuvres import laws as manoeuvres
+from auvsim.simulation import scenario
+from auvsim.vehicles import library
+from auvsim.vehicles.allocation import Allocation
+from estimators.core.types import Array
 
 
 def signals(path: Path) -> tuple[list[Signals], list[str], str]:

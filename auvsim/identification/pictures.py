@@ -11,13 +11,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from auvsim.drawing import dress
+from auvsim.analysis.style import dress
 from auvsim.identification.identifiability import WEAK, sizes
 from auvsim.identification.judgement import Judged, root_mean_square
 from auvsim.identification.pipeline import Identification
 from auvsim.identification.records import MEASURED
-from auvsim.planar_sets import UNITS
-from estimators.types import Array
+from auvsim.physics.planar_sets import UNITS
+from estimators.core.types import Array
 
 MEASURED_STYLE: dict[str, Any] = {"color": "#444444", "marker": ".", "ms": 3.0, "ls": "", "alpha": 0.35}
 START, FIT = "#d95f02", "#1f5fa8"

@@ -7,9 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import gammainc
 
-from auvsim import library
-from auvsim.condense import condense
-from auvsim.errors import InputError, unknown_name
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.identification import checks, judgement
 from auvsim.identification.constraints import SIGNS, limits, prior_information
 from auvsim.identification.fit import DEFAULT_FREE, Fit, invert
@@ -19,9 +17,11 @@ from auvsim.identification.least_squares import fit_least_squares
 from auvsim.identification.prediction_error import PredictionErrorOptions, fit_prediction_error
 from auvsim.identification.records import MEASURED, Readings, Record
 from auvsim.identification.segments import SegmentOptions, fit_segments
-from estimators.consistency import chi_square
-from estimators.planar_filter import steady_surge
-from estimators.planar_model import PlanarParameters
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.vehicles import library
+from estimators.core.consistency import chi_square
+from estimators.docking.models import steady_surge
+from estimators.planar.model import PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
 LENGTH = 20.0  # of the segments fitted [s]
@@ -116,7 +116,7 @@ def identify(
     model = model or vehicle
     speed = _speed(records, model)
     start_text = "parameters given" if start is not None else f"{vehicle} condensed at {speed:.2f} m/s"
-    start = start or condense(model, speed).parameters
+    start = start or fit_planar_model(model, speed).parameters
     checks.records((*records, *judging), start)
     said = "held out: as asked for"
     if not judging:
@@ -156,7 +156,7 @@ def _speed(records: Sequence[Record], vehicle: str) -> float:
         return 1.0
     shaft = float(np.mean(np.concatenate([r.inputs[:, 1] for r in records])))
     limit = library.vehicle(vehicle).shaft_limit
-    return float(np.clip(steady_surge(condense(vehicle, 1.0).parameters, min(shaft, limit)), 0.2, 10.0))
+    return float(np.clip(steady_surge(fit_planar_model(vehicle, 1.0).parameters, min(shaft, limit)), 0.2, 10.0))
 
 
 def _fits(

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification import compiled
 from auvsim.identification.fit import Nuisances, check
 from auvsim.identification.records import Record
 from auvsim.identification.states import first_belief, substeps
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 # While the lead is taken, the model is trusted nearly as far as its planar noise in the docking filters goes.
 _NOISE = np.array([0.0, 0.0, 0.0, 1e-5, 1e-5, 1e-6, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])

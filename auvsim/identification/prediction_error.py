@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvsim.errors import InputError, unknown_name
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.identification import compiled
 from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import (
@@ -30,8 +30,8 @@ from auvsim.identification.fit import (
 from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import first_belief, smoothed, substeps
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 NOISES = ("north", "east", "heading", "surge", "sway", "yaw_rate")
 _FLOOR, _CEILING = math.log(1e-14), math.log(1e2)  # of the densities

@@ -4,7 +4,7 @@ import math
 
 import auvsim
 from auvsim.identification.pipeline import Identification
-from auvsim.planar_sets import HoldOut, Noise, PlanarSet, coefficients
+from auvsim.physics.planar_sets import HoldOut, Noise, PlanarSet, coefficients
 
 
 def planar_set(found: Identification) -> PlanarSet:

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import h5py
 
-from auvsim import library
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification import checks, log_records, signals, table_records
 from auvsim.identification.columns import ColumnSettings, read_map
 from auvsim.identification.records import Readings
-from auvsim.planar_sets import Source
+from auvsim.physics.planar_sets import Source
+from auvsim.vehicles import library
 
 
 def read(

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from estimators.types import Array
+from estimators.core.types import Array
 
 WINDOW = 9  # fixes judged together: a steady current and speed over them are good enough for errors of metres
 _SWEEPS = 20  # reweighted least squares come to the least absolute sum within these

@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass
 
-from auvsim.planar_sets import Source
-from estimators.types import Array
+from auvsim.physics.planar_sets import Source
+from estimators.core.types import Array
 
 MEASURED = ("north", "east", "heading", "surge", "sway", "yaw_rate", "ground_surge", "ground_sway")
 

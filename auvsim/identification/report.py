@@ -9,11 +9,11 @@ from typing import Any
 import matplotlib
 from matplotlib.figure import Figure
 
-from auvsim.errors import InputError
-from auvsim.files import whole
+from auvsim.base.errors import InputError
+from auvsim.base.files import whole
 from auvsim.identification import pictures
 from auvsim.identification.pipeline import NAMES, Identification
-from auvsim.planar_sets import UNITS
+from auvsim.physics.planar_sets import UNITS
 
 DPI = 100
 _STYLE = """

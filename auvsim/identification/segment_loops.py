@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from estimators.compiling import compiled
-from estimators.loops import factor, solve, wrap
+from estimators.core.compiling import compiled
+from estimators.core.loops import factor, solve, wrap
 
 ROUNDING = 1e-13  # share of a diagonal that sums of squares may have lost; keeps an unstable trial's factor real
 

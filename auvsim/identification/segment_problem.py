@@ -10,14 +10,14 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification import compiled
 from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
 from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
 from auvsim.identification.records import Record
 from auvsim.identification.states import substeps
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 Loss = Literal["squares", "huber", "cauchy"]
 LOSSES: tuple[Loss, ...] = ("squares", "huber", "cauchy")

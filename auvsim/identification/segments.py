@@ -9,14 +9,14 @@ from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification.fit import DEFAULT_FREE, Fit, check, invert, residual_summary, with_values
 from auvsim.identification.least_squares import first_values
 from auvsim.identification.records import Record
 from auvsim.identification.segment_problem import LOSSES, Point, Problem, SegmentOptions, minimise
 from auvsim.identification.states import smoothed
-from estimators.planar_model import PlanarParameters
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
 
 _UNLIKELY = 5.0  # deviations of chi-square beyond which the lowest point from the start may not be the lowest of all
 _LONGER = 4.0  # times longer segments have other false bottoms: they fail from one start in 50, and not from the same

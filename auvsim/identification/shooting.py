@@ -12,7 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.linalg import splu
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification.constraints import limits
 from auvsim.identification.fit import (
     DEFAULT_FREE,
@@ -27,8 +27,8 @@ from auvsim.identification.fit import (
 from auvsim.identification.records import Record
 from auvsim.identification.segment_problem import active_nuisances
 from auvsim.identification.states import smoothed, substeps
-from estimators.planar_model import PARAMETER_NAMES, PlanarParameters, accelerations
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PARAMETER_NAMES, PlanarParameters, accelerations
 
 _SMALLEST = 1e-3  # of an inertia that is kept positive [kg, kg m^2]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from auvsim.identification.reckoning import strays
 from auvsim.identification.records import MEASURED, Record
-from estimators.types import Array
+from estimators.core.types import Array
 
 INPUTS = ("rudder", "shaft_speed")
 SHORTEST = 10.0  # spans shorter than this hold less than the vehicle's own time constants [s]

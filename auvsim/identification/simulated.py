@@ -7,11 +7,11 @@ from typing import Literal
 import numpy as np
 from numpy.random import Generator
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification.fit import Nuisances
 from auvsim.identification.records import MEASURED, Record
-from estimators.planar_model import PlanarParameters, PlanarProcess
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters, PlanarProcess
 
 Kind = Literal["multisine", "zigzag", "turns"]
 _FINE = 10  # steps of the truth in one of the record
@@ -66,9 +66,9 @@ def simulate(vessel: Vessel, kind: Kind, seed: int, duration: float = 300.0, ste
     start = np.array([0.0, 0.0, generator.uniform(-math.pi, math.pi), vessel.surge, 0.0, 0.0, *nuisances[:2]])
     spread = np.zeros(8)
     spread[:6] = np.sqrt(np.array(vessel.densities) * step / _FINE)
-    kicks = spread * generator.standard_normal((len(times) * _FINE, 8))
+    increments = spread * generator.standard_normal((len(times) * _FINE, 8))
     process = PlanarProcess(vessel.parameters, np.zeros(8))
-    states = process.walk(start, np.repeat(inputs, _FINE, axis=0), step / _FINE, kicks)[: len(kicks) : _FINE]
+    states = process.walk(start, np.repeat(inputs, _FINE, axis=0), step / _FINE, increments)[: len(increments) : _FINE]
     shown = _shown(states, nuisances)
     shown += np.array(vessel.deviations) * generator.standard_normal(shown.shape)
     for channel, interval in enumerate(vessel.intervals):

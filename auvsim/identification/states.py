@@ -6,10 +6,10 @@ import numpy as np
 
 from auvsim.identification import compiled
 from auvsim.identification.records import Record
-from estimators.errors import ParameterError
-from estimators.planar_filter import steady_surge
-from estimators.planar_model import MAX_SUBSTEP, PlanarParameters
-from estimators.types import Array
+from estimators.core.errors import ParameterError
+from estimators.core.types import Array
+from estimators.docking.models import steady_surge
+from estimators.planar.model import MAX_SUBSTEP, PlanarParameters
 
 # A body on which nothing acts in its own axes: its velocities stay as they are.
 STEADY = PlanarParameters(m=1.0, I_z=1.0, X_vr=-1.0, Y_ur=1.0)

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
-from auvsim.errors import InputError
-from estimators.types import Array
+from auvsim.base.errors import InputError
+from estimators.core.types import Array
 
 MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--"}
 

@@ -8,13 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.identification import checks
 from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, understand
 from auvsim.identification.records import MEASURED
 from auvsim.identification.signals import Signal, Signals, noise, steep
 from auvsim.identification.table_files import Column, load
-from estimators.types import Array
+from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
 _NEEDED = ("time", "rudder", "shaft_speed")

@@ -10,8 +10,8 @@ from functools import partial
 from itertools import groupby
 from typing import Any
 
-from auvsim.reproduce.paper1_runs import Track, Way
-from auvsim.reproduce.paper1_study import Result, Row, Score, score, summarise
+from auvsim.reproduce.paper1.runs import Track, Way
+from auvsim.reproduce.paper1.study import Result, Row, Score, score, summarise
 
 REFERENCE = "paper"  # the filter by which the others' errors are divided
 SEEDS_APART = 1_000_000  # more than any row has runs: no two seeds of a study share a run

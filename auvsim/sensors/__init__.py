@@ -1,0 +1,1 @@
+"""Sensors on board: one sensor a file."""

@@ -4,10 +4,10 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field
 
-from auvsim.randomness import Noise
-from auvsim.sensors.reading import Reading
-from auvsim.settings import Settings
-from auvsim.truth import Truth
+from auvsim.base.randomness import Noise
+from auvsim.base.reading import Reading
+from auvsim.base.settings import Settings
+from auvsim.physics.truth import Truth
 
 
 class DepthSettings(Settings):

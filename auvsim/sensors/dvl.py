@@ -10,12 +10,12 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, model_validator
 
-from auvsim.currents import CurrentField
-from auvsim.frames import rotation
-from auvsim.randomness import Noise
-from auvsim.sensors.reading import Reading
-from auvsim.settings import Settings
-from auvsim.truth import Truth
+from auvsim.base.frames import rotation
+from auvsim.base.randomness import Noise
+from auvsim.base.reading import Reading
+from auvsim.base.settings import Settings
+from auvsim.physics.truth import Truth
+from auvsim.water.currents import CurrentField
 
 Vector = tuple[float, float, float]
 USABLE = 0.8  # share of the altitude above which water track sees no bottom (as in Teledyne RDI's Pathfinder guide)

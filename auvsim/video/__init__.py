@@ -16,9 +16,9 @@ import av
 import matplotlib.image
 import numpy as np
 
-from auvsim.errors import DrawingError, InputError
-from auvsim.files import whole
-from auvsim.log import TrialLog
+from auvsim.base.errors import DrawingError, InputError
+from auvsim.base.files import whole
+from auvsim.data.log import TrialLog
 from auvsim.video.canvas import Picture
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage

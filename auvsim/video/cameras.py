@@ -6,8 +6,8 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from auvsim.errors import unknown_name
-from auvsim.frames import Array
+from auvsim.base.errors import unknown_name
+from auvsim.base.frames import Array
 from auvsim.video.canvas import Box
 from auvsim.video.playback import Moment, Playback
 

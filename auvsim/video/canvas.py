@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim.errors import DrawingError
+from auvsim.base.errors import DrawingError
 
 Picture = NDArray[np.uint8]  # (height, width, 3), first row on top
 NO_OPENGL = (

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import mujoco
 import numpy as np
 
-from auvsim import scenery
-from auvsim.frames import Array
+from auvsim.base.frames import Array
+from auvsim.physics import scenery
 from auvsim.video.playback import Moment, Playback
 
 Colour = tuple[float, float, float, float]

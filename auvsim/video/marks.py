@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from auvsim.frames import Array
+from auvsim.base.frames import Array
 from auvsim.video.layer import ARROW, DOT, LINE, Colour, Layer, Mark
 from auvsim.video.playback import Belief, Moment, Playback
 

@@ -11,7 +11,7 @@ from matplotlib.colors import to_rgb
 from matplotlib.ft2font import FT2Font
 from numpy.typing import NDArray
 
-from auvsim.drawing import phase_colour, phase_name
+from auvsim.analysis.style import phase_colour, phase_name
 from auvsim.video import marks
 from auvsim.video.canvas import Box, Picture
 from auvsim.video.layer import Colour

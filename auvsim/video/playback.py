@@ -7,13 +7,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim import library, scenario, scenery, world
-from auvsim.dock_frame import nose_position
-from auvsim.errors import InputError
-from auvsim.frames import Array, flip, flip_quaternion
-from auvsim.log import TrialLog
-from auvsim.metrics import fixes, phase_at
-from auvsim.truth import DockPose
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array, flip, flip_quaternion
+from auvsim.data.log import TrialLog
+from auvsim.missions.docking.dock_frame import nose_position
+from auvsim.missions.docking.metrics import fixes, phase_at
+from auvsim.physics import scenery, world
+from auvsim.physics.truth import DockPose
+from auvsim.simulation import scenario
+from auvsim.vehicles import library
 
 FARTHEST = 1e4  # a vehicle farther from the dock than this has diverged [m]
 # At 25 pictures a second a propeller of 25 revolutions a second would seem to stand still: it is shown slowed down.

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import mujoco
 
-from auvsim.errors import InputError
+from auvsim.base.errors import InputError
 from auvsim.video import overlay
 from auvsim.video.cameras import Cameras, project
 from auvsim.video.canvas import Box, Canvas, Picture

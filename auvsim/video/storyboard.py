@@ -5,8 +5,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from auvsim.frames import Array
-from auvsim.guidance import Phase
+from auvsim.base.frames import Array
+from auvsim.missions.docking.guidance import Phase
 from auvsim.video.playback import Playback
 
 LAPSE = 25.0  # speed-up far from the dock

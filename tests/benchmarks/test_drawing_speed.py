@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from auvsim import sampling, scenario, trial
+from auvsim.simulation import sampling, scenario, trial
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage
 from auvsim.video.storyboard import Frame

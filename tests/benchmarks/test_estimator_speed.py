@@ -13,12 +13,12 @@ from functools import partial
 import numpy as np
 import pytest
 
-from auvsim.reproduce.paper1_runs import Conditions, simulate, track
-from auvsim.reproduce.paper1_study import FILTERS
-from estimators import ekf
-from estimators.planar_filter import REFERENCE_NOISE, HeadingModel
-from estimators.planar_model import PRESTERO, PlanarProcess
-from estimators.types import Gaussian, Measurement
+from auvsim.reproduce.paper1.runs import Conditions, simulate, track
+from auvsim.reproduce.paper1.study import FILTERS
+from estimators.core import ekf
+from estimators.core.types import Gaussian, Measurement
+from estimators.docking.models import REFERENCE_NOISE, HeadingModel
+from estimators.planar.model import PRESTERO, PlanarProcess
 
 PROCESS, HEADING = PlanarProcess(PRESTERO, REFERENCE_NOISE.densities()), HeadingModel()
 MEAN = np.array([3.0, -7.0, 0.4, 0.9, -0.06, 0.05, 0.2, -0.3])

@@ -21,7 +21,7 @@ from auvsim.identification.segment_problem import Problem
 from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
 from auvsim.identification.states import smoothed
-from estimators.planar_model import PARAMETER_NAMES, PlanarParameters, PlanarProcess
+from estimators.planar.model import PARAMETER_NAMES, PlanarParameters, PlanarProcess
 
 # The REMUS-100 condensed at 1 m/s, rounded.
 PARAMETERS = PlanarParameters(
@@ -85,13 +85,13 @@ def test_prediction_error(benchmark):
 def whole_record(free):
     """A record without constant errors, and the residuals of its rollout from a known first state."""
     run = simulate(Vessel(parameters=PARAMETERS, errors=NO_NUISANCES), "multisine", 2, 300.0)
-    process, kicks = PlanarProcess(PARAMETERS, np.zeros(8)), np.zeros((len(run.record.times) - 1, 8))
+    process, increments = PlanarProcess(PARAMETERS, np.zeros(8)), np.zeros((len(run.record.times) - 1, 8))
     first, there = run.states[0], np.isfinite(run.record.measured[:, 2:6])
     places = [PARAMETER_NAMES.index(name) for name in free]
 
     def residuals(values):
         process._p[places] = values  # the compiled walk with other parameters
-        shown = process.walk(first, run.record.inputs[:-1], run.record.step, kicks)[:, 2:6]
+        shown = process.walk(first, run.record.inputs[:-1], run.record.step, increments)[:, 2:6]
         return ((shown - run.record.measured[:, 2:6]) / run.record.deviations[2:6])[there]
 
     return run, residuals

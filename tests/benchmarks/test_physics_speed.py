@@ -10,8 +10,9 @@ import mujoco.batch
 import numpy as np
 import pytest
 
-from auvsim import hydrodynamics, library
-from auvsim.frames import Array, flip_matrix
+from auvsim.base.frames import Array, flip_matrix
+from auvsim.physics import hydrodynamics
+from auvsim.vehicles import library
 
 STEPS = 2000
 TIMESTEP = 0.01

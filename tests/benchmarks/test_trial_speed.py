@@ -12,12 +12,15 @@ from pathlib import Path
 
 import pytest
 
-from auvsim import condense, log, metrics, sampling, scenario
-from auvsim.log import TrialLog
-from auvsim.navigation import Commands, Estimate
-from auvsim.sensors.reading import Reading
-from auvsim.trial import Loop, run_trial
-from auvsim.truth import Truth
+from auvsim.base.reading import Reading
+from auvsim.data import log
+from auvsim.data.log import TrialLog
+from auvsim.missions.docking import metrics
+from auvsim.navigation.navigator import Commands, Estimate
+from auvsim.physics import planar_fit
+from auvsim.physics.truth import Truth
+from auvsim.simulation import sampling, scenario
+from auvsim.simulation.trial import Loop, run_trial
 
 SEED = 7
 ROUNDS = 5
@@ -169,9 +172,9 @@ def test_making_the_log(benchmark, report, recording: Recording) -> None:
 def test_condense(benchmark) -> None:
     """The planar model of the vehicle, once a process."""
 
-    def anew() -> condense.Condensed:
-        condense.condense.cache_clear()
-        return condense.condense("remus100", 1.0, plan().world.water_density)
+    def anew() -> planar_fit.PlanarFit:
+        planar_fit.fit_planar_model.cache_clear()
+        return planar_fit.fit_planar_model("remus100", 1.0, plan().world.water_density)
 
     assert benchmark.pedantic(anew, rounds=ROUNDS).shaft_speed > 0.0
 

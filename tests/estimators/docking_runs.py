@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import fsolve
 
-from estimators.docking import DockingEstimator, UsblFix, UsblModel
-from estimators.planar_model import PRESTERO, planar_kernels
-from estimators.types import Array
+from estimators.core.types import Array
+from estimators.docking.estimator import DockingEstimator, UsblFix, UsblModel
+from estimators.planar.model import PRESTERO, planar_kernels
 
 DENSITIES = np.array([4e-4, 4e-4, 1e-7, 1e-5, 1e-5, 1e-6, 0.0, 0.0])  # of the truth, sec. 2 of the paper
 TRUTH_STEP, TICK = 0.1, 0.5  # [s]
@@ -68,12 +68,12 @@ def simulate(seed: int, radius: float = 40.0, duration: float = 200.0, jitter: f
     x = np.array([0.0, -radius, heading, *nu, 0.5 * math.cos(direction), 0.5 * math.sin(direction)])
     step, p = planar_kernels().step, PRESTERO.vector()
     count = round(duration / TRUTH_STEP)
-    kicks = rng.standard_normal((count, 8)) * np.sqrt(DENSITIES * TRUTH_STEP)
+    increments = rng.standard_normal((count, 8)) * np.sqrt(DENSITIES * TRUTH_STEP)
     states, following, F = np.empty((count + 1, 8)), np.empty(8), np.zeros((8, 8))
     states[0] = x
     for k in range(count):
         step(states[k], (rudder, 0.0), p, TRUTH_STEP, following, F)
-        states[k + 1] = following + kicks[k]
+        states[k + 1] = following + increments[k]
     compass = states[:: round(TICK / TRUTH_STEP), 2]
     compass = compass + COMPASS_SIGMA * rng.standard_normal(compass.size)
     usbl = UsblModel()

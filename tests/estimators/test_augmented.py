@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from docking_runs import TICK, position_errors, simulate, track
 
-from estimators.docking import AugmentedFilter, UsblFix
-from estimators.planar_model import PRESTERO
+from estimators.docking.estimator import AugmentedFilter, UsblFix
+from estimators.planar.model import PRESTERO
 
 
 def shifted(fix: UsblFix, offset) -> UsblFix:

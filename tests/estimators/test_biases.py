@@ -6,13 +6,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvsim.reproduce.paper1_runs import Conditions, simulate, track
-from estimators.docking import REFERENCE_NOISE, AugmentedFilter, Bias, DockingEstimator, DockingNoise
-from estimators.errors import ParameterError
-from estimators.history import Node
-from estimators.planar_filter import COMPASS, USBL, HeadingModel, PlanarModels, PositionModel
-from estimators.planar_model import BIASES, PRESTERO, PlanarProcess, step_function
-from estimators.types import Measurement
+from auvsim.reproduce.paper1.runs import Conditions, simulate, track
+from estimators.core.errors import ParameterError
+from estimators.core.history import Node
+from estimators.core.types import Measurement
+from estimators.docking.estimator import REFERENCE_NOISE, AugmentedFilter, Bias, DockingEstimator, DockingNoise
+from estimators.docking.models import COMPASS, USBL, HeadingModel, PlanarModels, PositionModel
+from estimators.planar.model import BIASES, PRESTERO, PlanarProcess, step_function
 
 ALL = {"surge": Bias(3e-3), "compass": Bias(0.02), "dock_heading": Bias(0.01), "clock": Bias(0.2)}
 STATE = np.array([30.0, -17.0, 0.4, 0.9, -0.06, 0.05, 0.2, -0.3, -0.01, 0.03, 0.05, 0.3])

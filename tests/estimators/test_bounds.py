@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from estimators import ekf
-from estimators.bounds import PosteriorBound, inverse
-from estimators.errors import NotPositiveDefiniteError
-from estimators.history import History
-from estimators.types import Gaussian, Measurement
+from estimators.core import ekf
+from estimators.core.bounds import PosteriorBound, inverse
+from estimators.core.errors import NotPositiveDefiniteError
+from estimators.core.history import History
+from estimators.core.types import Gaussian, Measurement
 
 P0 = np.diag([1.0, 0.5])
 Q = np.array([[0.02, 0.01], [0.01, 0.05]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from estimators.consistency import (
+from estimators.core.consistency import (
     assess,
     autocorrelation,
     chi_square,
@@ -16,7 +16,7 @@ from estimators.consistency import (
     nis,
     whiten,
 )
-from estimators.errors import ParameterError
+from estimators.core.errors import ParameterError
 
 
 @pytest.mark.parametrize("dof", [1, 2, 8, 320])

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from docking_runs import COMPASS_SIGMA, Run, position_errors, simulate, track
 
-from estimators.consistency import interval, nees
-from estimators.docking import (
+from estimators.core.consistency import interval, nees
+from estimators.core.errors import ParameterError
+from estimators.docking.estimator import (
     REFERENCE_NOISE,
     AugmentedFilter,
     DockingEstimator,
@@ -19,8 +20,7 @@ from estimators.docking import (
     estimate_current,
     horizontal_rotation,
 )
-from estimators.errors import ParameterError
-from estimators.planar_model import PRESTERO
+from estimators.planar.model import PRESTERO
 
 FIX = UsblFix(stamp=1.0, received=3.0, position=(10.0, 0.0, 0.0), heading=0.0, sequence=5)
 

@@ -5,13 +5,13 @@ import math
 import numpy as np
 import pytest
 
-from estimators import loops
-from estimators.consistency import chi_square
-from estimators.ekf import correct, correct_angle, correct_linear, predict
-from estimators.errors import NotFiniteError, NotPositiveDefiniteError
-from estimators.planar_filter import HeadingModel, PositionModel
-from estimators.planar_model import PRESTERO, PlanarProcess
-from estimators.types import Gaussian, Measurement
+from estimators.core import loops
+from estimators.core.consistency import chi_square
+from estimators.core.ekf import correct, correct_angle, correct_linear, predict
+from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError
+from estimators.core.types import Gaussian, Measurement
+from estimators.docking.models import HeadingModel, PositionModel
+from estimators.planar.model import PRESTERO, PlanarProcess
 
 
 def belief(seed=0, n=8):

@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from estimators.errors import ParameterError
-from estimators.history import History
-from estimators.types import Measurement
+from estimators.core.errors import ParameterError
+from estimators.core.history import History
+from estimators.core.types import Measurement
 
 
 class Recorder:

@@ -8,11 +8,11 @@ from scipy.linalg import expm
 from scipy.stats import multivariate_normal
 from test_ekf import belief, measurement
 
-from estimators import ekf, imm, loops, outliers
-from estimators.errors import ParameterError
-from estimators.outliers import Outliers
-from estimators.planar_filter import PositionModel
-from estimators.types import Gaussian
+from estimators.core import ekf, imm, loops, outliers
+from estimators.core.errors import ParameterError
+from estimators.core.outliers import Outliers
+from estimators.core.types import Gaussian
+from estimators.docking.models import PositionModel
 
 WEIGHTS = np.array([0.3, 0.7])
 TRANSITION = np.array([[0.9, 0.1], [0.2, 0.8]])

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 from test_augmented import shifted
 
-from auvsim.reproduce.paper1_runs import TICK, Conditions, in_order, simulate, track
-from estimators.docking import (
+from auvsim.reproduce.paper1.runs import TICK, Conditions, in_order, simulate, track
+from estimators.core.errors import NotFiniteError, ParameterError
+from estimators.core.history import Node
+from estimators.core.types import Measurement
+from estimators.docking.estimator import (
     INTERACTING_NOISE,
     REFERENCE_NOISE,
     AugmentedFilter,
@@ -18,12 +21,9 @@ from estimators.docking import (
     PaperFilter,
     UsblFix,
 )
-from estimators.errors import NotFiniteError, ParameterError
-from estimators.history import Node
-from estimators.planar_filter import COMPASS, USBL
-from estimators.planar_model import PRESTERO
-from estimators.recovery import Rejected, agreeing
-from estimators.types import Measurement
+from estimators.docking.models import COMPASS, USBL
+from estimators.docking.recovery import Rejected, agreeing
+from estimators.planar.model import PRESTERO
 
 BIASES = {"surge": Bias(3e-3), "compass": Bias(0.02), "dock_heading": Bias(0.01), "clock": Bias(0.1)}
 FILTERS = {

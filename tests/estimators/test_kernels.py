@@ -9,9 +9,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from estimators.compiling import cache_folder, load
-from estimators.errors import ParameterError
-from estimators.kernels import python_source
+from estimators.core.compiling import cache_folder, load
+from estimators.core.errors import ParameterError
+from estimators.core.kernels import python_source
 
 ROOT = Path(__file__).parents[2]
 
@@ -70,7 +70,7 @@ def test_without_a_writable_folder_the_source_is_kept_in_memory(monkeypatch, tmp
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("XDG_CACHE_HOME", str(blocked))
-    source = "from estimators.compiling import compiled\n\n\n@compiled\ndef double(x):\n    return 2.0 * x\n"
+    source = "from estimators.core.compiling import compiled\n\n\n@compiled\ndef double(x):\n    return 2.0 * x\n"
     assert load("blocked", source).double(3.0) == 6.0
 
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from docking_runs import STEADY_RUDDER, accelerations, steady_circle
 
-from estimators import planar_model
-from estimators.errors import NotFiniteError, ParameterError
-from estimators.planar_filter import steady_surge
-from estimators.planar_model import PARAMETER_NAMES, PRESTERO, PlanarParameters, PlanarProcess, step_function
+from estimators.core.errors import NotFiniteError, ParameterError
+from estimators.docking.models import steady_surge
+from estimators.planar import model as planar_model
+from estimators.planar.model import PARAMETER_NAMES, PRESTERO, PlanarParameters, PlanarProcess, step_function
 
 NO_NOISE = np.zeros(8)
 STATE = np.array([3.0, -7.0, 0.4, 0.9, -0.06, 0.05, 0.2, -0.3])

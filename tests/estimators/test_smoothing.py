@@ -6,17 +6,23 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvsim.reproduce.paper1_runs import Conditions, follow, simulate, track
-from auvsim.reproduce.paper1_study import FILTERS, ROWS
-from auvsim.reproduce.paper1_yardsticks import batch_and_filter
-from estimators import batch, ekf
-from estimators.consistency import interval, nees
-from estimators.docking import REFERENCE_NOISE, AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
-from estimators.errors import NotFiniteError, ParameterError
-from estimators.history import History
-from estimators.planar_model import PRESTERO
-from estimators.smoothing import smooth
-from estimators.types import Gaussian, Measurement
+from auvsim.reproduce.paper1.runs import Conditions, follow, simulate, track
+from auvsim.reproduce.paper1.study import FILTERS, ROWS
+from auvsim.reproduce.paper1.yardsticks import batch_and_filter
+from estimators.core import batch, ekf
+from estimators.core.consistency import interval, nees
+from estimators.core.errors import NotFiniteError, ParameterError
+from estimators.core.history import History
+from estimators.core.smoothing import smooth
+from estimators.core.types import Gaussian, Measurement
+from estimators.docking.estimator import (
+    REFERENCE_NOISE,
+    AugmentedFilter,
+    DockingEstimator,
+    InteractingFilter,
+    PaperFilter,
+)
+from estimators.planar.model import PRESTERO
 
 A, Q, R, H = np.array([[1.0, 0.5], [0.0, 0.9]]), np.array([[0.02, 0.01], [0.01, 0.05]]), 0.3, np.array([[1.0, 0.0]])
 P0 = np.diag([1.0, 0.5])

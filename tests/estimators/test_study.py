@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from auvsim.reproduce.paper1_runs import Conditions, follow, in_order, simulate, track
-from auvsim.reproduce.paper1_study import FILTERS, ROWS, evaluate, score, summarise
-from auvsim.reproduce.paper1_yardsticks import bound
-from estimators.consistency import assess, interval, ljung_box, nees, nis, whiten
-from estimators.docking import REFERENCE_NOISE, AugmentedFilter, DockingEstimator
-from estimators.planar_model import PRESTERO
+from auvsim.reproduce.paper1.runs import Conditions, follow, in_order, simulate, track
+from auvsim.reproduce.paper1.study import FILTERS, ROWS, evaluate, score, summarise
+from auvsim.reproduce.paper1.yardsticks import bound
+from estimators.core.consistency import assess, interval, ljung_box, nees, nis, whiten
+from estimators.docking.estimator import REFERENCE_NOISE, AugmentedFilter, DockingEstimator
+from estimators.planar.model import PRESTERO
 
 # Ratios of rms to the paper's filter: limits by row, from the study's acceptance column; for the filter with biases, at
 # least as good as the paper's everywhere and a tenth better but on the tightest circle. The measured values lie at

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from test_ekf import Constant, belief, measurement
 
-from estimators import ekf, ukf
-from estimators.augmented import AugmentedFilter
-from estimators.errors import NotPositiveDefiniteError, ParameterError
-from estimators.planar_filter import HeadingModel, PositionModel
-from estimators.planar_model import PRESTERO, PlanarProcess
-from estimators.types import Gaussian
+from estimators.core import ekf, ukf
+from estimators.core.errors import NotPositiveDefiniteError, ParameterError
+from estimators.core.types import Gaussian
+from estimators.docking.augmented import AugmentedFilter
+from estimators.docking.models import HeadingModel, PositionModel
+from estimators.planar.model import PRESTERO, PlanarProcess
 
 
 class Unmarked:

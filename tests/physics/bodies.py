@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
-from auvsim import hydrodynamics, library
+from auvsim.physics import hydrodynamics
+from auvsim.vehicles import library
 
 Array = NDArray[Any]
 

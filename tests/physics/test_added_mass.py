@@ -6,7 +6,7 @@ import pytest
 from bodies import TURN6, WHEEL, Rigid, acceleration, coriolis, dense, free_body, remus100, set_motion
 from scipy.spatial.transform import Rotation
 
-from auvsim import hydrodynamics
+from auvsim.physics import hydrodynamics
 
 RIGID = Rigid()
 ATTITUDE = Rotation.from_euler("ZYX", (0.8, -0.4, 1.1)).as_matrix()

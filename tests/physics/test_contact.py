@@ -11,7 +11,7 @@ import pytest
 from bodies import DENSITY, WHEEL, Rigid, free_body, motion, set_motion
 from scipy.spatial.transform import Rotation
 
-from auvsim import hydrodynamics
+from auvsim.physics import hydrodynamics
 
 MASS, ADDED, TURNING = 12.0, 30.0, 0.4
 INERTIA = np.diag([0.3, 0.5, 0.6])

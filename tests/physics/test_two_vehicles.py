@@ -5,9 +5,10 @@ import numpy as np
 import pytest
 from dm_control import mjcf
 
-from auvsim import hydrodynamics, library
-from auvsim.fluid import WATER
-from auvsim.forces import RECORD
+from auvsim.physics import hydrodynamics
+from auvsim.physics.fluid import WATER
+from auvsim.physics.forces import RECORD
+from auvsim.vehicles import library
 
 
 def fleet() -> tuple[mujoco.MjModel, dict[str, int]]:

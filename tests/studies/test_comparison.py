@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from comparison import CELLS, main, run_one, run_study, score, table
 from rich.console import Console
 
-from auvsim import sampling, scenario
-from auvsim.metrics import estimate_errors
-from auvsim.trial import run_trial
-from estimators.consistency import interval
+from auvsim.missions.docking.metrics import estimate_errors
+from auvsim.simulation import sampling, scenario
+from auvsim.simulation.trial import run_trial
+from auvsim.studies.comparison import CELLS, main, run_one, run_study, score, table
+from estimators.core.consistency import interval
 
 SEED = 9  # not among those used for tuning
 

@@ -4,8 +4,9 @@ import io
 import math
 
 import pytest
-from docking import LATER, Study, main, run_study, table
 from rich.console import Console
+
+from auvsim.studies.docking import LATER, Study, main, run_study, table
 
 SEED = 7  # not among those used for tuning
 

@@ -3,8 +3,9 @@
 import io
 
 import pytest
-from held_out import main, run_one, run_study, table
 from rich.console import Console
+
+from auvsim.studies.held_out import main, run_one, run_study, table
 
 
 def test_one_seed() -> None:

@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from identification import Covered, convergence, coverage, main, noisy, run_study, share_inside, table
 from rich.console import Console
+
+from auvsim.studies.identification import Covered, convergence, coverage, main, noisy, run_study, share_inside, table
 
 
 def test_one_seed_of_each() -> None:

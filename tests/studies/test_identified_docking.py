@@ -4,18 +4,29 @@ import io
 from pathlib import Path
 
 import pytest
-from identified_docking import MODELS, VEHICLE, main, model_set, ratio, rms, run_one, squares, table, wrong
 from rich.console import Console
 
-from auvsim import planar_sets
-from auvsim.condense import condense
 from auvsim.identification.fit import DEFAULT_FREE
+from auvsim.physics import planar_sets
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.studies.identified_docking import (
+    MODELS,
+    VEHICLE,
+    main,
+    model_set,
+    ratio,
+    rms,
+    run_one,
+    squares,
+    table,
+    wrong,
+)
 
 
 def test_a_set_of_the_condensed_model_is_as_good_as_it_and_a_wrong_one_worse(tmp_path: Path) -> None:
     """The same parameters by another way give the same estimates to the last bit; paired, so with one trial."""
     path = tmp_path / "same.yaml"
-    planar_sets.write(model_set(condense(VEHICLE, 1.0).parameters), path)
+    planar_sets.write(model_set(fit_planar_model(VEHICLE, 1.0).parameters), path)
     study = {model: (run_one(model, path, 1, 0),) for model in MODELS}
     same = ratio(study["identified"], study["condensed"])
     assert (same.value, same.low, same.high) == (1.0, 1.0, 1.0)
@@ -26,7 +37,7 @@ def test_a_set_of_the_condensed_model_is_as_good_as_it_and_a_wrong_one_worse(tmp
 
 
 def test_a_wrong_model_is_wrong_by_a_fifth_either_way() -> None:
-    right, off = condense(VEHICLE, 1.0).parameters, wrong(1, 0)
+    right, off = fit_planar_model(VEHICLE, 1.0).parameters, wrong(1, 0)
     shares = [getattr(off, name) / getattr(right, name) for name in DEFAULT_FREE]
     assert sorted({round(share, 9) for share in shares}) == [0.8, 1.2]
     assert (off.m, off.Y_vd) == (right.m, right.Y_vd)

@@ -2,10 +2,10 @@
 
 from pathlib import Path
 
+from auvsim.base.errors import InputError
+from auvsim.base.files import whole
 from auvsim.campaign.report.content import Content, read
 from auvsim.campaign.report.page import html
-from auvsim.errors import InputError
-from auvsim.files import whole
 
 NAME = "report.html"
 

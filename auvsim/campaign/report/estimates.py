@@ -5,7 +5,7 @@ from auvsim.campaign.report.content import Content, quantile, values
 from auvsim.campaign.report.markup import Markup, join, note, number, right, table, tag
 from auvsim.campaign.report.success import name_cell
 from auvsim.campaign.statistics import Nees
-from auvsim.log import PHASES
+from auvsim.data.log import PHASES
 
 PHASES_OF_NEES = ("all", "approach", "final")  # those that docking hangs on
 CONSISTENT = (

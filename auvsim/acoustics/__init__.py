@@ -1,0 +1,1 @@
+"""Acoustics: links with delay and loss, and the dock's USBL service."""

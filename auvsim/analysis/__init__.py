@@ -1,0 +1,1 @@
+"""Analysis of logs: errors of estimates, plots and their style."""

@@ -1,0 +1,25 @@
+"""The one shape in which anything measured on board or received reaches navigation, control and the log."""
+
+from typing import NamedTuple
+
+from auvsim.base.frames import Array
+
+
+class Reading(NamedTuple):  # a frozen dataclass takes three times as long to make, and a trial makes ten thousand
+    """A measurement with the time it was true and the time it arrived.
+
+    | sensor   | value                                                                                    |
+    | compass  | (3,) heading, pitch, roll [rad]                                                          |
+    | depth    | (1,) depth [m]                                                                           |
+    | feedback | (n + 1,) the n fin angles [rad] in the order of the allocation, then shaft speed [rad/s] |
+    | usbl     | (7,) transponder in the dock's frame x, y, z [m], dock heading, pitch, roll [rad],       |
+    |          | dock depth [m]                                                                           |
+    | dvl      | (6,) u, v, w over ground, then through the water [m/s]; NaN where that track is lost     |
+    | gyro     | (3,) p, q, r [rad/s]                                                                     |
+    """
+
+    sensor: str
+    stamp: float  # when it was true [s]
+    received: float  # when it arrived [s]
+    value: Array
+    sequence: int = 0  # counts the readings of one sensor, lost ones included

@@ -1,0 +1,1 @@
+"""Control: from setpoints to actuator commands."""

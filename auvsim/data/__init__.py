@@ -1,0 +1,1 @@
+"""What a run leaves: the log, its file format, and what records it."""

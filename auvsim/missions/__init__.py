@@ -1,0 +1,1 @@
+"""Missions: from an estimate to setpoints, with their phases, log variables and metrics."""

@@ -1,0 +1,1 @@
+"""Docking: guidance into a funnel dock, and what a docking log says."""

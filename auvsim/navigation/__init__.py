@@ -1,0 +1,1 @@
+"""Navigation: from readings to an estimate, by any estimator behind one contract."""

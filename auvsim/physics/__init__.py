@@ -1,0 +1,1 @@
+"""Hydrodynamics in MuJoCo: forces, the fluid callback, scenes, the world and its truth."""

@@ -1,0 +1,307 @@
+"""The native passive-force callback that puts hydrodynamics into MuJoCo.
+
+After velocities are known MuJoCo calls `mjcb_passive`. For every body with a coefficient record in `mjModel.body_user`
+(see `forces`; filled by `hydrodynamics`) the callback adds its forces to `qfrc_passive` and, for hulls, `J' M_A J` to
+the joint-space inertia `mjData.M`, which it then factorises again. All that follows in the step (contact, implicit
+integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in free motion and in contact.
+
+With v_r the hull's velocity relative to the water, omega its angular velocity and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is
+`-M_A J qacc` (in M) plus `M_A [a_c + omega x v_r - (d(J)/dt qvel); 0]`. The water's own pressure adds `rho V a_c` at
+the centre of buoyancy (Auton, Hunt & Prud'homme 1988).
+
+The water is a local expansion in `mjData.userdata`, one slot of `WATER` numbers a vehicle:
+`[time, place (3), velocity (3), dv/dt (3), dv_i/dx_j (9)]` in MuJoCo's world axes. A reset zeroes it.
+"""
+
+import ctypes
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import llvmlite.binding
+import mujoco
+from numba import cfunc, njit, types
+from numba.core.caching import FunctionCache
+
+from auvsim.physics import mujoco_structs
+from auvsim.physics.forces import (
+    DENSITY,
+    FIN_KIND,
+    HULL,
+    HULL_KIND,
+    PROPELLER,
+    PROPELLER_KIND,
+    SLOT,
+    added_momentum,
+    fin_force,
+    hull_force,
+    propeller_force,
+)
+from auvsim.physics.pointers import integers, load_pointer, numbers, scratch
+
+WATER = 19  # numbers in a water slot
+
+_MASS, _VOLUME = HULL["added_mass"][0], HULL["displaced_volume"][0]
+_SWIRL = PROPELLER["swirl_recovery"][0]
+_scratch = scratch(42)  # a hull's Jacobian (6, 6) and a row of its product
+
+
+@njit(cache=True, error_model="numpy")
+def _water_at(water, slot, time, x0, x1, x2):
+    """Velocity of the water (3) at a place and time from the local expansion in `water[slot:]`."""
+    dt = time - water[slot]
+    d0, d1, d2 = x0 - water[slot + 1], x1 - water[slot + 2], x2 - water[slot + 3]
+    g = slot + 10
+    v0 = water[slot + 4] + water[slot + 7] * dt + water[g] * d0 + water[g + 1] * d1 + water[g + 2] * d2
+    v1 = water[slot + 5] + water[slot + 8] * dt + water[g + 3] * d0 + water[g + 4] * d1 + water[g + 5] * d2
+    v2 = water[slot + 6] + water[slot + 9] * dt + water[g + 6] * d0 + water[g + 7] * d1 + water[g + 8] * d2
+    return v0, v1, v2
+
+
+@njit(cache=True, error_model="numpy")
+def _apply(qfrc, cdof, parent, dof, f0, f1, f2, m0, m1, m2):
+    """Adds a world force and moment about the tree's centre of mass to all joints that move the body."""
+    while dof >= 0:
+        a = 6 * dof
+        qfrc[dof] += cdof[a] * m0 + cdof[a + 1] * m1 + cdof[a + 2] * m2
+        qfrc[dof] += cdof[a + 3] * f0 + cdof[a + 4] * f1 + cdof[a + 5] * f2
+        dof = parent[dof]
+
+
+@njit(cache=True, error_model="numpy")
+def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, dof0, qfrc, M, rows, J):
+    """A hull's forces into `qfrc` and its added mass into `M`; `com` is its tree's centre of mass (3)."""
+    R = 9 * body
+    r00, r01, r02, r10, r11, r12 = xmat[R], xmat[R + 1], xmat[R + 2], xmat[R + 3], xmat[R + 4], xmat[R + 5]
+    r20, r21, r22 = xmat[R + 6], xmat[R + 7], xmat[R + 8]
+    x0, x1, x2 = xpos[3 * body], xpos[3 * body + 1], xpos[3 * body + 2]
+    a0, a1, a2 = x0 - com[0], x1 - com[1], x2 - com[2]
+    o0, o1, o2 = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
+    s0 = cvel[6 * body + 3] + o1 * a2 - o2 * a1
+    s1 = cvel[6 * body + 4] + o2 * a0 - o0 * a2
+    s2 = cvel[6 * body + 5] + o0 * a1 - o1 * a0
+    slot = int(c[o + SLOT])
+    c0, c1, c2 = _water_at(water, slot, time, x0, x1, x2)
+    g = slot + 10
+    # Material acceleration of the water, Dv/Dt = dv/dt + (v . grad) v.
+    b0 = water[slot + 7] + water[g] * c0 + water[g + 1] * c1 + water[g + 2] * c2
+    b1 = water[slot + 8] + water[g + 3] * c0 + water[g + 4] * c1 + water[g + 5] * c2
+    b2 = water[slot + 9] + water[g + 6] * c0 + water[g + 7] * c1 + water[g + 8] * c2
+    # Change of the water's velocity per metre along the hull.
+    e0 = water[g] * r00 + water[g + 1] * r10 + water[g + 2] * r20
+    e1 = water[g + 3] * r00 + water[g + 4] * r10 + water[g + 5] * r20
+    e2 = water[g + 6] * r00 + water[g + 7] * r10 + water[g + 8] * r20
+
+    u0, u1, u2 = s0 - c0, s1 - c1, s2 - c2
+    v0 = r00 * u0 + r10 * u1 + r20 * u2
+    v1 = r01 * u0 + r11 * u1 + r21 * u2
+    v2 = r02 * u0 + r12 * u1 + r22 * u2
+    w0 = r00 * o0 + r10 * o1 + r20 * o2
+    w1 = r01 * o0 + r11 * o1 + r21 * o2
+    w2 = r02 * o0 + r12 * o1 + r22 * o2
+    f0, f1, f2, m0, m1, m2 = hull_force(
+        c, o, v0, v1, v2, w0, w1, w2, r01 * e0 + r11 * e1 + r21 * e2, r02 * e0 + r12 * e1 + r22 * e2
+    )
+
+    # The acceleration that M does not carry: omega x (omega x p), p from the free joint's origin to the hull's, in
+    # world axes.
+    j0 = dof0 + 3
+    p0, p1, p2 = 0.0, 0.0, 0.0  # omega x p = velocity of the hull's origin less that of the joint's
+    for k in range(3):
+        d = 6 * (j0 + k)
+        q = cdof[d] * o0 + cdof[d + 1] * o1 + cdof[d + 2] * o2  # angular rate about this joint axis
+        p0 += q * (cdof[d + 3] + cdof[d + 1] * a2 - cdof[d + 2] * a1)
+        p1 += q * (cdof[d + 4] + cdof[d + 2] * a0 - cdof[d] * a2)
+        p2 += q * (cdof[d + 5] + cdof[d] * a1 - cdof[d + 1] * a0)
+    k0 = b0 + o1 * u2 - o2 * u1 - (o1 * p2 - o2 * p1)
+    k1 = b1 + o2 * u0 - o0 * u2 - (o2 * p0 - o0 * p2)
+    k2 = b2 + o0 * u1 - o1 * u0 - (o0 * p1 - o1 * p0)
+    n0 = r00 * k0 + r10 * k1 + r20 * k2
+    n1 = r01 * k0 + r11 * k1 + r21 * k2
+    n2 = r02 * k0 + r12 * k1 + r22 * k2
+    f0 += added_momentum(c, o, 0, n0, n1, n2, 0.0, 0.0, 0.0)
+    f1 += added_momentum(c, o, 1, n0, n1, n2, 0.0, 0.0, 0.0)
+    f2 += added_momentum(c, o, 2, n0, n1, n2, 0.0, 0.0, 0.0)
+    m0 += added_momentum(c, o, 3, n0, n1, n2, 0.0, 0.0, 0.0)
+    m1 += added_momentum(c, o, 4, n0, n1, n2, 0.0, 0.0, 0.0)
+    m2 += added_momentum(c, o, 5, n0, n1, n2, 0.0, 0.0, 0.0)
+
+    # To world axes; buoyancy and the water's own pressure gradient act at the hull's origin.
+    mass = c[o + DENSITY] * c[o + _VOLUME]
+    F0 = r00 * f0 + r01 * f1 + r02 * f2 + mass * (b0 - gravity[0])
+    F1 = r10 * f0 + r11 * f1 + r12 * f2 + mass * (b1 - gravity[1])
+    F2 = r20 * f0 + r21 * f1 + r22 * f2 + mass * (b2 - gravity[2])
+    T0 = r00 * m0 + r01 * m1 + r02 * m2 + a1 * F2 - a2 * F1
+    T1 = r10 * m0 + r11 * m1 + r12 * m2 + a2 * F0 - a0 * F2
+    T2 = r20 * m0 + r21 * m1 + r22 * m2 + a0 * F1 - a1 * F0
+    _apply(qfrc, cdof, parent, dof0 + 5, F0, F1, F2, T0, T1, T2)
+
+    # J: column i is the hull's velocity, in its axes, for unit speed of joint axis i.
+    for i in range(6):
+        d = 6 * (dof0 + i)
+        l0 = cdof[d + 3] + cdof[d + 1] * a2 - cdof[d + 2] * a1
+        l1 = cdof[d + 4] + cdof[d + 2] * a0 - cdof[d] * a2
+        l2 = cdof[d + 5] + cdof[d] * a1 - cdof[d + 1] * a0
+        J[i] = r00 * l0 + r10 * l1 + r20 * l2
+        J[6 + i] = r01 * l0 + r11 * l1 + r21 * l2
+        J[12 + i] = r02 * l0 + r12 * l1 + r22 * l2
+        J[18 + i] = r00 * cdof[d] + r10 * cdof[d + 1] + r20 * cdof[d + 2]
+        J[24 + i] = r01 * cdof[d] + r11 * cdof[d + 1] + r21 * cdof[d + 2]
+        J[30 + i] = r02 * cdof[d] + r12 * cdof[d + 1] + r22 * cdof[d + 2]
+    for i in range(6):
+        for k in range(6):  # row i of J' M_A
+            total = 0.0
+            for n in range(6):
+                total += J[6 * n + i] * c[o + _MASS + 6 * n + k]
+            J[36 + k] = total
+        row = rows[dof0 + i]
+        for j in range(i + 1):
+            total = 0.0
+            for n in range(6):
+                total += J[36 + n] * J[6 * n + j]
+            M[row + j] += total
+
+
+@njit(cache=True, error_model="numpy")
+def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, parent, dof, qfrc):
+    """Forces of a fin or a propeller, from the local velocity at its origin; `hinge` is the shaft's rate [rad/s]."""
+    R = 9 * body
+    x0, x1, x2 = xpos[3 * body], xpos[3 * body + 1], xpos[3 * body + 2]
+    a0, a1, a2 = x0 - com[0], x1 - com[1], x2 - com[2]
+    o0, o1, o2 = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
+    c0, c1, c2 = _water_at(water, int(c[o + SLOT]), time, x0, x1, x2)
+    u0 = cvel[6 * body + 3] + o1 * a2 - o2 * a1 - c0
+    u1 = cvel[6 * body + 4] + o2 * a0 - o0 * a2 - c1
+    u2 = cvel[6 * body + 5] + o0 * a1 - o1 * a0 - c2
+    ahead = xmat[R] * u0 + xmat[R + 3] * u1 + xmat[R + 6] * u2
+    if kind == FIN_KIND:
+        across = xmat[R + 1] * u0 + xmat[R + 4] * u1 + xmat[R + 7] * u2
+        chord, normal = fin_force(c, o, ahead, across)
+        F0 = xmat[R] * chord + xmat[R + 1] * normal
+        F1 = xmat[R + 3] * chord + xmat[R + 4] * normal
+        F2 = xmat[R + 6] * chord + xmat[R + 7] * normal
+        _apply(qfrc, cdof, parent, dof, F0, F1, F2, a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0)
+        return
+    thrust, torque = propeller_force(c, o, ahead, hinge / (2.0 * math.pi))
+    F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
+    T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
+    qfrc[dof] += torque
+    # The hull feels the torque less what the tail recovers from the swirl.
+    torque *= 1.0 - c[o + _SWIRL]
+    T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque
+    _apply(qfrc, cdof, parent, parent[dof], F0, F1, F2, T0, T1, T2)
+
+
+_make_M = types.ExternalFunction("mj_makeM", types.void(types.intp, types.intp))
+_factor_M = types.ExternalFunction("mj_factorM", types.void(types.intp, types.intp))
+_project = types.ExternalFunction("mj_projectConstraint", types.void(types.intp, types.intp))
+
+
+def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -> Any:
+    """Compiles the callback; the offsets are closure constants, so that a change of them is a new cache entry."""
+    m_nbody, m_nuser, m_user = model_at["nbody"], model_at["nuser_body"], model_at["body_user"]
+    m_weld, m_dofadr, m_dofnum = model_at["body_weldid"], model_at["body_dofadr"], model_at["body_dofnum"]
+    m_root, m_parent, m_rows = model_at["body_rootid"], model_at["dof_parentid"], model_at["M_rowadr"]
+    d_time, d_userdata, d_xpos, d_xmat = data_at["time"], data_at["userdata"], data_at["xpos"], data_at["xmat"]
+    d_cvel, d_com, d_cdof = data_at["cvel"], data_at["subtree_com"], data_at["cdof"]
+    d_qfrc, d_M, d_qvel = data_at["qfrc_passive"], data_at["M"], data_at["qvel"]
+
+    @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
+    def passive(m, d):
+        nuser = load_pointer(m + m_nuser)
+        if nuser == 0:
+            return
+        nbody = load_pointer(m + m_nbody)
+        c = numbers(load_pointer(m + m_user))
+        weld, dofadr = integers(load_pointer(m + m_weld)), integers(load_pointer(m + m_dofadr))
+        dofnum, root = integers(load_pointer(m + m_dofnum)), integers(load_pointer(m + m_root))
+        parent, rows = integers(load_pointer(m + m_parent)), integers(load_pointer(m + m_rows))
+        time = numbers(d + d_time)[0]
+        water, xpos = numbers(load_pointer(d + d_userdata)), numbers(load_pointer(d + d_xpos))
+        xmat, cvel = numbers(load_pointer(d + d_xmat)), numbers(load_pointer(d + d_cvel))
+        coms, cdof = load_pointer(d + d_com), numbers(load_pointer(d + d_cdof))
+        qfrc, M = numbers(load_pointer(d + d_qfrc)), numbers(load_pointer(d + d_M))
+        qvel = numbers(load_pointer(d + d_qvel))
+        J = _scratch()
+        touched = False
+        for body in range(1, nbody):
+            o = nuser * body
+            kind = int(c[o])
+            if kind == 0:
+                continue
+            base = weld[body]
+            com = numbers(coms + 24 * root[body])
+            if kind == HULL_KIND:
+                if not touched:
+                    # Rebuilt here, so that entering twice (mj_forwardSkip, mjd_transitionFD) adds nothing twice.
+                    _make_M(m, d)
+                    touched = True
+                gravity = numbers(m + gravity_at)
+                at = dofadr[base]
+                _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, at, qfrc, M, rows, J)
+            elif kind in (FIN_KIND, PROPELLER_KIND):
+                dof = dofadr[base] + dofnum[base] - 1
+                _surface(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
+        if touched:
+            _factor_M(m, d)
+            _project(m, d)
+
+    return passive
+
+
+_callback: Any = None
+
+
+def _library() -> ctypes.CDLL:
+    """MuJoCo's shared library, already loaded by the `mujoco` package."""
+    folder = Path(str(mujoco.__file__)).parent
+    for pattern in ("libmujoco.so.*", "libmujoco*.dylib", "mujoco.dll"):
+        for path in folder.glob(pattern):
+            return ctypes.CDLL(os.fspath(path))
+    raise OSError(f"no MuJoCo library in {folder}")
+
+
+def _cached_code() -> list[Path]:
+    """The index files of numba's cache for this module that are up to date; the others are deleted.
+
+    Numba watches the file of the function that it keeps, but this module's code has that of others inside.
+    """
+    try:
+        folder = Path(FunctionCache(_build).cache_path)
+    except RuntimeError:  # numba finds no folder that it may write to
+        return []
+    written = max(Path(__file__).with_name(name).stat().st_mtime for name in ("forces.py", "pointers.py"))
+    current = []
+    for index in folder.glob("fluid.*.nbi"):
+        if index.stat().st_mtime < written:
+            index.unlink(missing_ok=True)
+        else:
+            current.append(index)
+    return current
+
+
+def is_warm() -> bool:
+    """Whether `install` needs no compilation: it ran before, in this process or, through numba's cache, in another."""
+    return _callback is not None or any(index.name.startswith("fluid._build") for index in _cached_code())
+
+
+def install() -> None:
+    """Compiles (6 s once, then from the cache) and installs the callback for all models of this process.
+
+    A model without coefficient records is untouched by it.
+
+    Raises:
+        AuvsimError: MuJoCo's memory layout is not what its introspection says.
+    """
+    global _callback
+    if _callback is None:
+        _cached_code()
+        mujoco_structs.verify()
+        library = _library()
+        for name in ("mj_makeM", "mj_factorM", "mj_projectConstraint"):
+            address = ctypes.cast(getattr(library, name), ctypes.c_void_p).value
+            llvmlite.binding.add_symbol(name, address)
+        gravity_at = mujoco_structs.offsets("mjModel")["opt"] + mujoco_structs.offsets("mjOption")["gravity"]
+        _callback = _build(mujoco_structs.offsets("mjModel"), mujoco_structs.offsets("mjData"), gravity_at)
+    mujoco.set_mjcb_passive(_callback.ctypes)

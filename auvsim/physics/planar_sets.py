@@ -1,0 +1,198 @@
+"""Sets of the planar model's parameters as files, and which of them an estimator believes.
+
+A vehicle's own sets are `models/<vehicle>/planar/<name>.yaml`; any other is given by its path. A set says of each
+parameter its value, unit and interval, and of itself where it came from.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated
+
+from pydantic import Field, ValidationError, model_validator
+
+from auvsim.base import schema, yaml_text
+from auvsim.base.errors import InputError, unknown_name
+from auvsim.base.files import whole
+from auvsim.base.settings import Settings
+from auvsim.physics.hydrodynamics import SEA_WATER
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.vehicles import library
+from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
+
+CONDENSE = "condense"  # the model of that name is no set: it is condensed from the vehicle
+SUFFIX = ".yaml"
+UNITS = {
+    "m": "kg", "x_g": "m", "I_z": "kg m2",
+    "X_ud": "kg", "Y_vd": "kg", "Y_rd": "kg m", "N_vd": "kg m", "N_rd": "kg m2",
+    "X_uu": "kg/m", "X_vr": "kg", "X_rr": "kg m", "X_dd": "kg/m", "X_prop": "N",
+    "Y_vv": "kg/m", "Y_rr": "kg m", "Y_uv": "kg/m", "Y_ur": "kg", "Y_dd": "kg/m", "Y_v": "kg/s", "Y_r": "kg m/s",
+    "N_vv": "kg", "N_rr": "kg m2", "N_uv": "kg", "N_ur": "kg m", "N_dd": "kg", "N_v": "kg m/s", "N_r": "kg m2/s",
+    "X_u": "kg/s", "X_nn": "kg m", "X_nu": "kg",
+}  # fmt: skip
+
+
+class Coefficient(Settings):
+    """One parameter; a radian counts as 1, as in SNAME's tables."""
+
+    value: float
+    unit: str
+    interval: tuple[float | None, float | None] | None = Field(
+        default=None, description="95 % interval, null where it is open; without one the parameter was not fitted"
+    )
+
+
+class Source(Settings):
+    """A file the parameters came from."""
+
+    file: str
+    sha256: str = Field(pattern="^[0-9a-f]{64}$", description="of the file's bytes")
+
+
+class HoldOut(Settings):
+    """How well the set predicts a manoeuvre that it was not fitted to, open loop."""
+
+    record: str
+    seconds: float = Field(description="length of each prediction [s]")
+    share: float = Field(ge=0, description="error of the position at its end by the distance run, rms [-]")
+    start_share: float = Field(ge=0, description="the same of the parameters from which the fit started [-]")
+
+
+class Noise(Settings):
+    """Densities of the process noise that the data show."""
+
+    north: float = Field(ge=0, description="[m2/s]")
+    east: float = Field(ge=0, description="[m2/s]")
+    heading: float = Field(ge=0, description="[rad2/s]")
+    surge: float = Field(ge=0, description="[m2/s3]")
+    sway: float = Field(ge=0, description="[m2/s3]")
+    yaw_rate: float = Field(ge=0, description="[rad2/s3]")
+
+
+class PlanarSet(Settings):
+    """Parameters of the planar model of one vehicle, and where they came from."""
+
+    format: Annotated[int, Field(ge=1, le=1, description="version of this layout")] = 1
+    vehicle: str
+    speed: float = Field(gt=0, description="mean speed through the water of the data [m/s]")
+    method: str
+    start: str = Field(description="the parameters from which the fit started")
+    version: str = Field(description="of auvsim")
+    sources: tuple[Source, ...]
+    hold_out: HoldOut | None = None
+    verdict: tuple[str, ...] = Field(default=(), description="what the data say of the fit")
+    parameters: dict[str, Coefficient] = Field(description="rudder positive to starboard, about the body's origin")
+    noise: Noise | None = None
+
+    @model_validator(mode="after")
+    def _parameters_are_known(self) -> "PlanarSet":
+        for name, coefficient in self.parameters.items():
+            if name not in UNITS:
+                raise ValueError(f"parameters.{name}: no such parameter; there are {', '.join(PARAMETER_NAMES)}")
+            if coefficient.unit != UNITS[name]:
+                raise ValueError(f"parameters.{name}: is in '{coefficient.unit}', it must be in '{UNITS[name]}'")
+        missing = [name for name in ("m", "I_z") if name not in self.parameters]
+        if missing:
+            raise ValueError(f"parameters: {' and '.join(missing)} must be given; what else is left out is 0")
+        return self
+
+    def planar(self) -> PlanarParameters:
+        """The parameters as filters take them."""
+        return PlanarParameters(**{name: coefficient.value for name, coefficient in self.parameters.items()})
+
+
+def coefficients(
+    parameters: PlanarParameters, intervals: Mapping[str, tuple[float | None, float | None]]
+) -> dict[str, Coefficient]:
+    """All parameters as a set holds them; those with an interval were fitted."""
+    return {
+        name: Coefficient(value=getattr(parameters, name), unit=UNITS[name], interval=intervals.get(name))
+        for name in PARAMETER_NAMES
+    }
+
+
+def write(planar_set: PlanarSet, path: Path) -> None:
+    """Writes a set, whole or not at all; `read` gives it back bit for bit.
+
+    Raises:
+        InputError: If it cannot be written.
+    """
+    values = planar_set.model_dump(mode="json", exclude_none=True)
+    del values["parameters"]
+    # A line for each parameter, since they are read as a table; an interval's open side is null.
+    shown = {name: of.model_dump(exclude={"interval"} if of.interval is None else None)
+             for name, of in planar_set.parameters.items()}  # fmt: skip
+    lines = [f"  {name}: {yaml_text.dump(of, flow=True)}" for name, of in shown.items()]
+    text = "\n".join((yaml_text.dump(values).rstrip(), "parameters:", *lines, ""))
+    try:
+        with whole(path) as partial:
+            partial.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+
+
+def read(path: Path) -> PlanarSet:
+    """Reads a set.
+
+    Raises:
+        InputError: One line with the file, the line and the key at fault.
+    """
+    document = yaml_text.load(path)
+    if not isinstance(document.value, Mapping):
+        raise InputError(f"{path}: a parameter set is a mapping of keys to values; `auvsim identify` writes one")
+    try:
+        return PlanarSet.model_validate_json(json.dumps(document.value, default=str), strict=True)
+    except ValidationError as error:
+        raise schema.explain(error, PlanarSet, document.value, {"": str(path), **document.places}) from None
+
+
+def folder(vehicle: str) -> Path:
+    """Where the sets of a vehicle are: `planar` beside its MJCF file."""
+    home = Path(vehicle).expanduser().parent if vehicle.endswith(".xml") else library.models_folder() / vehicle
+    return home / "planar"
+
+
+def find(name: str, vehicle: str) -> Path:
+    """The file of a set, by its name among the vehicle's or by its path, which ends in `.yaml`.
+
+    Raises:
+        InputError: There is none; the text lists those that exist.
+    """
+    path = Path(name).expanduser() if name.endswith(SUFFIX) else folder(vehicle) / f"{name}{SUFFIX}"
+    if path.is_file():
+        return path
+    if name.endswith(SUFFIX):
+        raise InputError(f"no parameter file {path}; `auvsim identify LOG... --out DIR` writes DIR/parameters.yaml")
+    known = [found.stem for found in folder(vehicle).glob(f"*{SUFFIX}")]
+    raise unknown_name("planar model", name, [CONDENSE, *known, "the path of a .yaml"])
+
+
+def load(name: str, vehicle: str) -> PlanarParameters:
+    """The parameters of a set, by its name among the vehicle's or by its path.
+
+    Raises:
+        InputError: There is no such set, it cannot be read, or it is another vehicle's.
+    """
+    path = find(name, vehicle)
+    found = read(path)
+    wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
+    if found.vehicle != wanted:
+        raise InputError(f"{path}: these are parameters of '{found.vehicle}', not of '{wanted}'")
+    return found.planar()
+
+
+def believed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:
+    """The parameters that an estimator believes.
+
+    Args:
+        model: `condense`, or a set by name or path.
+        vehicle: Name in models/, or the path of an MJCF file.
+        speed: At which to condense [m/s].
+        density: Of the water [kg/m3].
+
+    Raises:
+        InputError: As `load`, or as `condense`.
+    """
+    if model == CONDENSE:
+        return fit_planar_model(vehicle, speed, density).parameters
+    return load(model, vehicle)

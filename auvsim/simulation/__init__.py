@@ -1,0 +1,1 @@
+"""Simulation: scenarios, how they are drawn, and the loop that runs them."""

@@ -1,0 +1,1 @@
+"""The models in models/: loading vehicles and docks, and their actuation."""

@@ -1,0 +1,1 @@
+"""Estimation whatever the vehicle: Gaussians, filters, histories, bounds and consistency."""

@@ -1,0 +1,95 @@
+"""The extended Kalman filter without state of its own: belief in, belief out."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.core import loops
+from estimators.core.consistency import chi_square
+from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError
+from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Innovation:
+    """What a measurement said that the belief did not."""
+
+    residual: Array  # (m,)
+    covariance: Array  # (m, m) of the residual, S = H P H' + R
+    gain: Array  # (n, m) Kalman gain
+    nis: float  # residual' S^-1 residual
+    accepted: bool  # False: outside the gate, the belief is as it was
+
+
+def predict(belief: Gaussian, process: ProcessModel, u: Sequence[float], dt: float) -> Gaussian:
+    """The belief after `dt` [s] with the input `u` held: f(x), F P F' + Q.
+
+    A process with a `propagate(mean, covariance, u, dt) -> (mean, covariance, ...)` of its own is predicted with that.
+
+    Raises:
+        NotFiniteError: The prediction is not finite.
+    """
+    propagate = getattr(process, "propagate", None)
+    if propagate is not None:
+        mean, covariance, *_ = propagate(belief.mean, belief.covariance, u, dt)
+        return Gaussian(mean=mean, covariance=covariance)
+    x = belief.mean
+    F = process.jacobian(x, u, dt)
+    P = F @ belief.covariance @ F.T + process.covariance(x, u, dt)
+    mean = process.evaluate(x, u, dt)
+    if not (np.isfinite(mean).all() and np.isfinite(P).all()):
+        raise NotFiniteError(f"prediction over {dt:g} s from {x} with input {u} is not finite")
+    return Gaussian(mean=mean, covariance=0.5 * (P + P.T))
+
+
+def correct(
+    belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None
+) -> tuple[Gaussian, Innovation]:
+    """The belief after a measurement, in Joseph's form.
+
+    Args:
+        belief: State before the measurement.
+        measurement: Value (m,) and covariance (m, m).
+        model: What the sensor shows of the state.
+        gate: Probability with which a measurement that fits the models is accepted, 0.999 say; None accepts all.
+
+    Raises:
+        NotPositiveDefiniteError: The innovation's covariance is not positive definite.
+        NotFiniteError: The correction is not finite.
+    """
+    x = belief.mean
+    residual = model.residual(measurement.value, model.evaluate(x))
+    limit = math.inf if gate is None else chi_square(gate, residual.size)
+    return correct_linear(belief, model.jacobian(x), residual, model.covariance(x, measurement), limit)
+
+
+def correct_linear(
+    belief: Gaussian, H: Array, residual: Array, R: Array, limit: float = math.inf
+) -> tuple[Gaussian, Innovation]:
+    """As `correct`, with H (m, n), residual (m,) and R (m, m) at hand; `limit` is the largest accepted NIS."""
+    mean, covariance, gain, S, nis, status = loops.correct(belief.mean, belief.covariance, H, residual, R, limit)
+    if status == loops.NOT_POSITIVE_DEFINITE:
+        raise NotPositiveDefiniteError(
+            f"innovation covariance {S.tolist()} of residual {residual} is not positive definite"
+        )
+    if status == loops.NOT_FINITE:
+        raise NotFiniteError(f"correction of {belief.mean} by the residual {residual} is not finite")
+    innovation = Innovation(residual=residual, covariance=S, gain=gain, nis=nis, accepted=status == loops.OK)
+    return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation
+
+
+def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> Gaussian:
+    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns.
+
+    The same numbers as of `correct` in half its time, without what it says of the innovation.
+
+    Raises:
+        NotPositiveDefiniteError, NotFiniteError: As `correct`.
+    """
+    mean, covariance, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
+    if status != loops.OK:
+        residual = np.array([loops.wrap(value[0] - H[0] @ belief.mean)])
+        return correct_linear(belief, H, residual, R)[0]  # says what is wrong
+    return Gaussian(mean=mean, covariance=covariance)

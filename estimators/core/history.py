@@ -1,0 +1,206 @@
+"""Measurements out of sequence: nodes in time order are kept, rolled back to, inserted between, and replayed.
+
+The delay buffer of Qiu and Li (2019), sec. 2.3.
+
+Works with any filter of the protocol `Filter`. Whatever the order in which measurements are delivered, the latest state
+is, bit for bit, that of the same filter fed in order without delay, as long as nothing is older than the history
+reaches.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from estimators.core import loops
+from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError, ParameterError
+from estimators.core.types import Measurement
+
+State = TypeVar("State")
+Input = tuple[float, ...]
+
+REFUSALS = ("future", "too_old", "not_finite", "not_positive_definite", "duplicate")
+
+
+class Node(Generic[State]):
+    """One instant: what was measured then, the input from then to the next node, and the filter's state after it."""
+
+    __slots__ = ("failed", "input", "is_grid", "measurements", "prompt", "state", "time")
+
+    def __init__(self, time: float, u: Input, measurements: list[Measurement], is_grid: bool) -> None:
+        self.time = time  # [s]
+        self.input = u
+        self.measurements = measurements
+        self.prompt = len(measurements)  # how many of them, the first ones, were made at the tick and did not come late
+        self.is_grid = is_grid  # a tick of the filter, not a time inserted for a measurement
+        self.state: State | None = None  # None before the filter has started
+        self.failed = False  # the filter could not go on here and started anew
+
+
+class Filter(Protocol[State]):
+    """What a history replays. States are immutable and carry all that the next node needs."""
+
+    def start(self, nodes: Sequence[Node[State]], index: int) -> State | None:
+        """First state, at a node with measurements; None if they do not suffice. Neighbours may be read only."""
+        ...
+
+    def predict(self, state: State, u: Input, duration: float) -> State:
+        """State after `duration` [s] with the input held."""
+        ...
+
+    def correct(self, state: State, node_time: float, measurements: Sequence[Measurement]) -> State:
+        """State after a node's measurements, in their order."""
+        ...
+
+
+class History(Generic[State]):
+    """The delay buffer: grid nodes at the filter's ticks and inserted nodes at the stamps of late measurements.
+
+    Where the filter cannot go on, because its numbers are not finite or its covariance not positive definite, it starts
+    anew at the next node that suffices for it, which is counted as `reinitialised`.
+
+    Args:
+        filter: What to run over the nodes.
+        step: Nominal time between ticks [s]. A late measurement within a tenth of it of a tick belongs to that tick
+            ("yellow" in the paper), else it gets a node of its own ("blue"), which takes the input of the node before
+            it.
+        keep: Age up to which measurements are accepted [s]; must exceed the longest delay.
+    """
+
+    def __init__(self, filter: Filter[State], *, step: float, keep: float = 30.0) -> None:
+        if not 0.0 < step <= keep:
+            raise ParameterError(f"step {step} s and age kept {keep} s must satisfy 0 < step <= keep")
+        self._filter = filter
+        self._snap = step / 10.0
+        self._keep = keep
+        self.nodes: list[Node[State]] = []
+        self.refused: dict[str, int] = dict.fromkeys(REFUSALS, 0)  # measurements refused so far, by reason
+        self.reinitialised = 0  # how often the filter has failed and started anew
+        self._accepted: list[Measurement] = []
+        self._touched = 0  # first node whose state is out of date
+
+    @property
+    def state(self) -> State | None:
+        """The state at the latest node; None before the filter has started. Up to date after `replay`."""
+        return self.nodes[-1].state if self.nodes else None
+
+    def append(self, time: float, u: Input, measurements: Sequence[Measurement] = ()) -> None:
+        """Adds the tick at `time` [s] with the input that held since the last one and the measurements made at it.
+
+        Raises:
+            ParameterError: The time is not after that of the last tick, or not a number.
+        """
+        if not math.isfinite(time) or (self.nodes and time <= self.nodes[-1].time):
+            raise ParameterError(
+                f"tick at {time} s must come after that at {self.nodes[-1].time if self.nodes else 0} s"
+            )
+        if self.nodes:
+            self.nodes[-1].input = u
+        self.nodes.append(Node(time, u, [m for m in measurements if self._is_sound(m)], is_grid=True))
+        # A node leaves by age once nothing that is still accepted can be attached to it: it then only serves as the
+        # base of the next.
+        oldest = time - self._keep - self._snap
+        if self._touched <= 1 < len(self.nodes) and self.nodes[1].time < oldest:
+            self.replay()  # the next node's base must be up to date before it can leave
+        while len(self.nodes) > 1 and self.nodes[1].time < oldest:
+            del self.nodes[0]
+            self._touched = max(0, self._touched - 1)
+
+    def insert(self, measurement: Measurement) -> bool:
+        """Puts a late measurement where it belongs, for `replay` to act on; or counts why it is refused: False."""
+        if not self._is_sound(measurement) or not self._is_timely(measurement) or self._is_duplicate(measurement):
+            return False
+        index = self._place(measurement.stamp)
+        node = self.nodes[index]
+        node.measurements.append(measurement)
+        # Late measurements of one node stand in stamp order, whichever came first.
+        node.measurements[node.prompt :] = sorted(node.measurements[node.prompt :], key=lambda m: (m.stamp, m.kind))
+        self._touched = min(self._touched, index)
+        return True
+
+    def replay(self) -> State | None:
+        """Brings every node from the earliest touched one up to date and returns the latest state."""
+        nodes, filter = self.nodes, self._filter
+        for index in range(self._touched, len(nodes)):
+            node = nodes[index]
+            before = nodes[index - 1] if index else None
+            try:
+                if before is None or before.state is None:
+                    node.state = filter.start(nodes, index) if node.measurements else None
+                    continue
+                state = filter.predict(before.state, before.input, node.time - before.time)
+                node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
+            except (NotFiniteError, NotPositiveDefiniteError):
+                self._restart(index)
+        self._touched = len(nodes)
+        return self.state
+
+    def _restart(self, index: int) -> None:
+        """Starts the filter at a node where it failed, or leaves that to a later one; counts each such node once."""
+        node = self.nodes[index]
+        self.reinitialised += not node.failed
+        node.failed = True
+        try:
+            node.state = self._filter.start(self.nodes, index) if node.measurements else None
+        except (NotFiniteError, NotPositiveDefiniteError):
+            node.state = None
+
+    def refuse(self, reason: str) -> bool:
+        """Counts a refused measurement; always False."""
+        self.refused[reason] = self.refused.get(reason, 0) + 1
+        return False
+
+    def _place(self, stamp: float) -> int:
+        """Index of the node that a measurement belongs to, inserted if need be."""
+        nodes = self.nodes
+        after = len(nodes)
+        while after and nodes[after - 1].time > stamp:
+            after -= 1
+        # Only ticks attract: whether a node was inserted before or after must not matter.
+        distance, index = min((abs(nodes[k].time - stamp), k) for k in self._neighbouring_ticks(after))
+        if distance < self._snap:
+            return index
+        if nodes[after - 1].time == stamp:
+            return after - 1
+        nodes.insert(after, Node(stamp, nodes[after - 1].input, [], is_grid=False))
+        self._touched += self._touched > after
+        return after
+
+    def _neighbouring_ticks(self, after: int) -> list[int]:
+        """Indices of the ticks before and after a place between nodes; the latest node is always a tick."""
+        before = next((k for k in range(after - 1, -1, -1) if self.nodes[k].is_grid), None)
+        following = next((k for k in range(after, len(self.nodes)) if self.nodes[k].is_grid), None)
+        return [k for k in (before, following) if k is not None]
+
+    def _is_sound(self, measurement: Measurement) -> bool:
+        """Counts measurements that are not finite or whose covariance is not positive definite."""
+        value, covariance = measurement.value, measurement.covariance
+        numbers = (measurement.stamp, *value.tolist(), *covariance.ravel().tolist())
+        if not all(map(math.isfinite, numbers)):
+            return self.refuse("not_finite")
+        if value.size == 1:  # the common case, cheaply
+            return numbers[2] > 0.0 or self.refuse("not_positive_definite")
+        # The factorisation reads one triangle only.
+        asymmetry = np.abs(covariance - covariance.T).max()
+        is_symmetric = asymmetry <= 1e-9 * np.abs(covariance).max()
+        return (is_symmetric and loops.factor(covariance)[1]) or self.refuse("not_positive_definite")
+
+    def _is_timely(self, measurement: Measurement) -> bool:
+        """Counts measurements from the future and from before the history."""
+        if not self.nodes or measurement.stamp > self.nodes[-1].time:
+            return self.refuse("future")
+        if measurement.stamp < max(self.nodes[-1].time - self._keep, self.nodes[0].time):
+            return self.refuse("too_old")
+        return True
+
+    def _is_duplicate(self, measurement: Measurement) -> bool:
+        """Counts measurements that came before: same kind, and same sequence number or same stamp."""
+        oldest = self.nodes[-1].time - self._keep
+        self._accepted = [m for m in self._accepted if m.stamp >= oldest]
+        for known in self._accepted:
+            same_number = measurement.sequence is not None and known.sequence == measurement.sequence
+            if known.kind == measurement.kind and (same_number or known.stamp == measurement.stamp):
+                return not self.refuse("duplicate")
+        self._accepted.append(measurement)
+        return False

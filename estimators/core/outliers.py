@@ -1,0 +1,79 @@
+"""A measurement that may be an outlier: both possibilities are weighed and merged.
+
+As probabilistic data association does with measurements of uncertain origin (Bar-Shalom and Tse 1975).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from estimators.core import ekf
+from estimators.core.ekf import Innovation
+from estimators.core.errors import ParameterError
+from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
+
+IMPOSSIBLE = -1e300  # log likelihood of what no hypothesis explains
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Outliers:
+    """How often a sensor's measurements are wrong, and by how much: an equal mix of normal errors."""
+
+    prior: float = 0.03  # probability of each measurement
+    deviations: tuple[float, ...] = (3.0, 15.0)  # of each component, in the measurement's unit
+
+    def __post_init__(self) -> None:
+        if not (0.0 < self.prior < 1.0 and self.deviations and min(self.deviations) > 0.0):
+            raise ParameterError(f"prior {self.prior} must lie in 0..1 and deviations {self.deviations} above 0")
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class MixtureUpdate:
+    """The outcome of a correction by a measurement that may be an outlier."""
+
+    belief: Gaussian  # merged of both possibilities
+    innovation: Innovation
+    log_likelihood: float  # of the measurement
+    probability: float  # that it was an outlier
+
+
+def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel, outliers: Outliers) -> MixtureUpdate:
+    """The belief after a measurement that may be an outlier and then says nothing of the state.
+
+    Raises:
+        NotPositiveDefiniteError, NotFiniteError: As `ekf.correct`.
+    """
+    corrected, innovation = ekf.correct(belief, measurement, model)
+    sound = math.log1p(-outliers.prior) + log_density(innovation.covariance, innovation.residual)
+    share = math.log(outliers.prior / len(outliers.deviations))
+    wrong = [
+        share + log_density(innovation.covariance + d * d * np.eye(innovation.residual.size), innovation.residual)
+        for d in outliers.deviations
+    ]
+    highest = max(sound, *wrong)
+    if not math.isfinite(highest):  # so far off that its square is no number
+        return MixtureUpdate(belief=belief, innovation=innovation, log_likelihood=IMPOSSIBLE, probability=1.0)
+    total = math.exp(sound - highest) + sum(math.exp(w - highest) for w in wrong)
+    p = 1.0 - math.exp(sound - highest) / total
+    step = corrected.mean - belief.mean
+    covariance = p * belief.covariance + (1.0 - p) * corrected.covariance + p * (1.0 - p) * np.outer(step, step)
+    return MixtureUpdate(
+        belief=Gaussian(mean=belief.mean + (1.0 - p) * step, covariance=covariance),
+        innovation=innovation,
+        log_likelihood=highest + math.log(total),
+        probability=p,
+    )
+
+
+def log_density(covariance: Array, residual: Array) -> float:
+    """Logarithm of the normal density of a residual (m,) with its covariance (m, m)."""
+    if residual.size == 2:  # the common case, cheaply
+        (a, b), (_, c) = covariance.tolist()
+        x, y = residual.tolist()
+        determinant = a * c - b * b
+        return -0.5 * ((c * x * x - 2.0 * b * x * y + a * y * y) / determinant + math.log(determinant)) - math.log(
+            2.0 * math.pi
+        )
+    _, logarithm = np.linalg.slogdet(2.0 * math.pi * covariance)
+    return -0.5 * float(residual @ np.linalg.solve(covariance, residual) + logarithm)

@@ -1,0 +1,277 @@
+"""What filters on the planar model share: noise, the compass and position models, and the start from a first fix."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TypedDict
+
+import numpy as np
+
+from estimators.core import ekf
+from estimators.core.errors import ParameterError
+from estimators.core.history import Node
+from estimators.core.loops import wrap
+from estimators.core.types import Array, Gaussian, Measurement
+from estimators.planar.model import BIASES, MAX_SUBSTEP, Biases, Integrator, PlanarParameters, PlanarProcess
+
+COMPASS, USBL = "compass", "usbl"  # kinds of measurement
+
+
+@dataclass(frozen=True, slots=True)
+class Bias:
+    """What is believed of a constant error before it is estimated; units as in `planar_model.BIASES`."""
+
+    deviation: float  # standard deviation of its first value
+    density: float = 0.0  # of its random walk [its unit squared per second]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class DockingNoise:
+    """What a docking filter believes of its noise; process noise as power spectral densities.
+
+    The defaults fit a vehicle whose planar model is a condensed one: accelerations are trusted ten times less than
+    those of the reference study, in which truth and filter shared the model.
+    """
+
+    position: float = 4e-4  # [m^2/s]
+    heading: float = 1e-6  # [rad^2/s]
+    surge: float = 1e-4  # [m^2/s^3]
+    sway: float = 1e-4  # [m^2/s^3]
+    yaw_rate: float = 1e-5  # [rad^2/s^3]
+    current: float = 3e-3  # random walk of the current [m^2/s^3]; 1e-5 suits a constant one and fails in turns
+    compass: float = math.radians(1.0)  # standard deviation of a sample [rad]
+    initial_surge: float = 0.1  # standard deviations at the first fix [m/s]
+    initial_sway: float = 0.05  # [m/s]
+    initial_yaw_rate: float = 0.05  # [rad/s]
+    initial_current: float = 0.5 / math.sqrt(2.0)  # each component [m/s]
+    biases: Mapping[str, Bias] = field(default_factory=dict)  # estimated besides, by the names of BIASES
+
+    def __post_init__(self) -> None:
+        unknown = [name for name in self.biases if name not in BIASES]
+        if unknown:
+            raise ParameterError(f"no bias {', '.join(unknown)}; there are {', '.join(BIASES)}")
+
+    @property
+    def bias_names(self) -> Biases:
+        """The biases in the state, in their order there."""
+        return tuple(name for name in BIASES if name in self.biases)
+
+    def densities(self) -> Array:
+        """Power spectral densities (8,) in the order of the state, then one of each bias."""
+        velocities = (self.surge, self.sway, self.yaw_rate)
+        biases = [self.biases[name].density for name in self.bias_names]
+        return np.array([self.position, self.position, self.heading, *velocities, self.current, self.current, *biases])
+
+
+# The reference study's truth (Qiu and Li 2019; calibrated to its Table 1), with a current that hardly changes.
+REFERENCE_NOISE = DockingNoise(position=4e-4, heading=1e-7, surge=1e-5, sway=1e-5, yaw_rate=1e-6, current=1e-8)
+# For eq. 11's filter, whose covariance does not know the error of the current: position noise covers for it.
+PAPER_NOISE = DockingNoise(position=2.5e-3, heading=1e-7, surge=1e-5, sway=1e-5, yaw_rate=1e-6, current=0.0)
+
+# Errors of the model that are fixed to the vehicle and not to the world, and so are no current: thrust or drag by some
+# tenth (3e-3 m/s^2 shift the REMUS-100's surge by 5 % at 0.8 m/s), and the compass.
+BIASES_OF_VEHICLE = {"surge": Bias(3e-3), "compass": Bias(0.02)}
+# For interacting modes, which bring the current's noise themselves: without and with these errors in the state.
+INTERACTING_NOISE = replace(REFERENCE_NOISE, current=0.0)
+ROBUST_NOISE = replace(INTERACTING_NOISE, biases=BIASES_OF_VEHICLE)
+REGULAR_NOISE = replace(PAPER_NOISE, position=1.0)  # the best for a filter that knows neither current nor delay
+
+
+class HeadingModel:
+    """A compass: y = psi, plus the state `bias` if given; a MeasurementModel of `n` states, psi the third."""
+
+    is_linear = True
+
+    def __init__(self, n: int = 8, bias: int | None = None) -> None:
+        self._bias = bias
+        self._H = np.eye(1, n, 2)
+        if bias is not None:
+            self._H[0, bias] = 1.0
+
+    def evaluate(self, x: Array) -> Array:
+        return x[2:3] if self._bias is None else x[2:3] + x[self._bias]
+
+    def jacobian(self, x: Array) -> Array:
+        return self._H
+
+    def covariance(self, x: Array, measurement: Measurement) -> Array:
+        return measurement.covariance
+
+    def residual(self, value: Array, expected: Array) -> Array:
+        return np.array((wrap(float(value[0]) - float(expected[0])),))
+
+
+class PositionModel:
+    """The horizontal position (north, east) of a point (x, y) [m] of the hull, forward and starboard of its origin.
+
+    As the dock reports it: turned about the dock by the error of its compass, the state `dock_heading`, and taken later
+    than its stamp says by the state `clock`, to first order; None where that is no state. States have `n` elements.
+    """
+
+    def __init__(
+        self,
+        point: tuple[float, float] = (0.0, 0.0),
+        n: int = 8,
+        *,
+        dock_heading: int | None = None,
+        clock: int | None = None,
+    ) -> None:
+        self._x, self._y = point
+        self._H = np.eye(2, n)
+        self._dock_heading, self._clock = dock_heading, clock
+        self.is_linear = dock_heading is None and clock is None and point == (0.0, 0.0)
+
+    def evaluate(self, x: Array) -> Array:
+        return self._shown(x)[0]
+
+    def jacobian(self, x: Array) -> Array:
+        return self._shown(x)[1]
+
+    def covariance(self, x: Array, measurement: Measurement) -> Array:
+        return measurement.covariance
+
+    def residual(self, value: Array, expected: Array) -> Array:
+        return value - expected
+
+    def _shown(self, x: Array) -> tuple[Array, Array]:
+        """Value and Jacobian."""
+        c, s = math.cos(x[2]), math.sin(x[2])
+        H = self._H.copy()
+        north, east = c * self._x - s * self._y, s * self._x + c * self._y
+        H[0, 2], H[1, 2] = -east, north
+        if self._clock is not None:
+            delay = x[self._clock]
+            ahead, abeam = c * x[3] - s * x[4], s * x[3] + c * x[4]  # velocity through the water, north and east
+            north += delay * (ahead + x[6])
+            east += delay * (abeam + x[7])
+            H[0, 2] -= delay * abeam
+            H[1, 2] += delay * ahead
+            H[:, 3:5] = delay * np.array(((c, -s), (s, c)))
+            H[0, 6] = H[1, 7] = delay
+            H[:, self._clock] = ahead + x[6], abeam + x[7]
+        value = np.array((x[0] + north, x[1] + east))
+        if self._dock_heading is not None:
+            # The dock takes its heading for larger than it is, and so the bearing of all it sees.
+            c, s = math.cos(x[self._dock_heading]), math.sin(x[self._dock_heading])
+            R = np.array(((c, -s), (s, c)))
+            value, H = R @ value, R @ H
+            H[:, self._dock_heading] = -value[1], value[0]
+        return value, H
+
+
+def steady_surge(parameters: PlanarParameters, shaft_speed: float) -> float:
+    """Surge [m/s] at which thrust and drag balance on a straight course; 0 if the thrust is astern.
+
+    Raises:
+        ParameterError: The parameters have thrust but no drag.
+    """
+    p, n = parameters, shaft_speed
+    a, b, c = p.X_uu, p.X_u + p.X_nu * abs(n), p.X_prop + p.X_nn * n * abs(n)
+    if c <= 0.0:
+        return 0.0
+    if a < 0.0:
+        return (-b - math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+    if a == 0.0 and b < 0.0:
+        return -c / b
+    raise ParameterError(f"thrust {c:g} N meets no drag: X_uu {p.X_uu:g} or X_u {p.X_u:g} must be below 0")
+
+
+class ModelOptions(TypedDict, total=False):
+    """What filters on the planar model pass on to their `PlanarModels`, which explains it and has the defaults."""
+
+    transponder: tuple[float, float]
+    initial_surge: float | None
+    integrator: Integrator
+    max_substep: float
+
+
+class PlanarModels:
+    """The process and measurement models of a docking filter, made of what it believes; and its start.
+
+    Args:
+        parameters: The vehicle.
+        noise: What the filter believes of its noise, and the biases in its state.
+        transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
+        initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
+        integrator: "midpoint" or "euler".
+        max_substep: Longest substep of the prediction [s].
+    """
+
+    def __init__(
+        self,
+        parameters: PlanarParameters,
+        noise: DockingNoise,
+        *,
+        transponder: tuple[float, float] = (0.0, 0.0),
+        initial_surge: float | None = None,
+        integrator: Integrator = "midpoint",
+        max_substep: float = MAX_SUBSTEP,
+    ) -> None:
+        self.parameters, self.noise = parameters, noise
+        self._initial_surge = initial_surge
+        self._numerics = {"integrator": integrator, "max_substep": max_substep, "biases": noise.bias_names}
+        self.process = self.process_with(noise)
+        places = {name: 8 + k for k, name in enumerate(noise.bias_names)}
+        n = 8 + len(places)
+        self.heading = HeadingModel(n, places.get("compass"))
+        self.position = PositionModel(
+            transponder, n, dock_heading=places.get("dock_heading"), clock=places.get("clock")
+        )
+
+    def process_with(self, noise: DockingNoise) -> PlanarProcess:
+        """The same vehicle with other densities of the process noise."""
+        return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
+
+    def fuse_heading(self, belief: Gaussian, sample: Measurement) -> Gaussian:
+        """Belief after a compass sample; the sensor is linear, so that this holds for every Kalman filter."""
+        return ekf.correct_angle(belief, self.heading.jacobian(belief.mean), sample.value, sample.covariance)
+
+    def first(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, Measurement] | None:
+        """Belief at the node of a first fix, and that fix; None without a fix there or any compass sample.
+
+        Heading by the compass at that time, surge given or steady at the shaft speed then, the rest zero (sec. 7 of the
+        paper).
+        """
+        fix = next((m for m in nodes[index].measurements if m.kind == USBL), None)
+        heading = None if fix is None else _heading_at(nodes, index)
+        if fix is None or heading is None:
+            return None
+        noise, names = self.noise, self.noise.bias_names
+        surge = self._initial_surge
+        if surge is None:
+            surge = steady_surge(self.parameters, nodes[index].input[1])
+        mean = np.array([0.0, 0.0, heading, surge, 0.0, 0.0, 0.0, 0.0, *(0.0 for _ in names)])
+        mean[:2] = fix.value - self.position.evaluate(mean)
+        deviations = (noise.compass, noise.initial_surge, noise.initial_sway, noise.initial_yaw_rate)
+        currents = (noise.initial_current, noise.initial_current)
+        biases = [noise.biases[name].deviation for name in names]
+        covariance = np.diag(np.square([0.0, 0.0, *deviations, *currents, *biases]))
+        covariance[:2, :2] = fix.covariance
+        # What the compass shows too much the heading has too much.
+        J = np.eye(mean.size)
+        if "compass" in names:
+            J[2, 8 + names.index("compass")] = -1.0
+        # The fix is known, so that the position takes on the errors of all else that it shows.
+        onto = np.eye(mean.size)
+        onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
+        J = onto @ J
+        return Gaussian(mean=mean, covariance=J @ covariance @ J.T), fix
+
+
+def _heading_at(nodes: Sequence[Node], index: int) -> float | None:
+    """The compass at a node: its own sample, else interpolated between neighbours, else the nearest before or after."""
+    before = next((k for k in range(index, -1, -1) if _compass(nodes[k]) is not None), None)
+    after = next((k for k in range(index, len(nodes)) if _compass(nodes[k]) is not None), None)
+    if before is None or after is None:
+        known = before if before is not None else after
+        return None if known is None else _compass(nodes[known])
+    start, end = _compass(nodes[before]), _compass(nodes[after])
+    assert start is not None
+    assert end is not None
+    duration = nodes[after].time - nodes[before].time
+    share = (nodes[index].time - nodes[before].time) / duration if duration else 0.0
+    return wrap(start + share * wrap(end - start))
+
+
+def _compass(node: Node) -> float | None:
+    return next((float(m.value[0]) for m in node.measurements if m.kind == COMPASS), None)

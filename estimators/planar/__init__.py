@@ -1,0 +1,1 @@
+"""The planar model of a rudder-driven vehicle and its noise."""

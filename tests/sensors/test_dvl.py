@@ -1,0 +1,171 @@
+"""The Doppler log: geometry against an independent rotation, errors against their settings, what it loses and when."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
+from scipy.stats import binom, chi2
+
+from auvsim.base.frames import euler_to_quaternion
+from auvsim.base.randomness import stream
+from auvsim.physics.truth import Truth
+from auvsim.sensors.dvl import Dvl, DvlSettings
+from auvsim.water.currents import CurrentField, build_current
+from auvsim.water.settings import ShearPoint, ShearSettings, UniformSettings
+
+EXACT: dict[str, Any] = {
+    "bottom_noise": (0.0, 0.0, 0.0),
+    "water_noise": (0.0, 0.0, 0.0),
+    "scale_error": 0.0,
+    "bias": 0.0,
+    "misalignment_deg": 0.0,
+    "dropout_probability": 0.0,
+}
+COUNT = 20_000
+ATTITUDE, NU = (0.1, -0.2, 2.3), (1.4, -0.1, 0.05, 0.0, 0.0, 0.1)
+WATER = UniformSettings(speed=0.4, direction_deg=70.0, down=0.02)
+
+
+def field(settings: Any = WATER) -> CurrentField:
+    """The current of some settings."""
+    return build_current(settings, stream(0, 0, "current"), 100.0)
+
+
+def truth(depth: float = 10.0, current: CurrentField | None = None) -> Truth:
+    """A vehicle that pitches, rolls and turns at a depth."""
+    position = np.array([3.0, -4.0, depth])
+    return Truth(
+        time=7.0,
+        position=position,
+        quaternion=euler_to_quaternion(*ATTITUDE),
+        attitude=np.array(ATTITUDE),
+        nu=np.array(NU),
+        current=(current or field()).evaluate(7.0, position).velocity,
+        fins=np.zeros(4),
+        shaft_speed=100.0,
+    )
+
+
+def log(trial: int = 0, *, floor: float = 40.0, current: CurrentField | None = None, **settings: Any) -> Dvl:
+    """A Doppler log of a trial."""
+    return Dvl(DvlSettings(**settings), stream(5, trial, "remus100/dvl"), current or field(), floor)
+
+
+def through_water(current: np.ndarray) -> np.ndarray:
+    """Velocity through the water in the body's axes, by scipy's rotation."""
+    return np.array(NU[:3]) - Rotation.from_euler("ZYX", ATTITUDE[::-1]).inv().apply(np.array(current))
+
+
+def test_an_exact_log_measures_both_velocities() -> None:
+    """Over ground as the truth has it, through the water by an independent rotation of the current."""
+    reading = log(**EXACT).measure(truth())
+    np.testing.assert_array_equal(reading.value[:3], NU[:3])
+    np.testing.assert_allclose(reading.value[3:], through_water(truth().current), atol=1e-15)  # rounding
+    assert (reading.sensor, reading.stamp, reading.received, reading.sequence) == ("dvl", 7.0, 7.0, 0)
+
+
+def test_noise_is_white_on_each_axis_about_constant_errors() -> None:
+    """Means and variances inside their intervals; no axis knows another or its own past."""
+    dvl = log(dropout_probability=0.0)
+    exact = log(**EXACT).measure(truth()).value
+    values = np.array([dvl.measure(truth()).value for _ in range(COUNT)])
+    turn = Rotation.from_euler("Z", dvl.misalignment).inv()
+    mean = np.concatenate([dvl.scale * turn.apply(part) for part in (exact[:3], exact[3:])]) + dvl.biases
+    sigma = np.array([0.01, 0.01, 0.004, 0.02, 0.02, 0.008])
+    unit = (values - mean) / sigma
+    low, high = chi2.ppf([1e-5, 1 - 1e-5], COUNT)  # each axis falsely refused once in 50 000
+    squares = np.square(unit).sum(axis=0)
+    assert ((low < squares) & (squares < high)).all()
+    assert (np.abs(unit.mean(axis=0)) < 4.3 / math.sqrt(COUNT)).all()  # 4.3 deviations of a mean
+    correlation = np.corrcoef(unit.T) - np.eye(6)
+    assert np.abs(correlation).max() < 4.6 / math.sqrt(COUNT)  # 15 pairs
+    past = (unit[1:] * unit[:-1]).mean(axis=0)
+    assert (np.abs(past) < 4.3 / math.sqrt(COUNT)).all()
+
+
+def test_constant_errors_vary_from_trial_to_trial_as_set() -> None:
+    """Scale 0.2 %, mounting 0.3 deg, biases 2 mm/s, each with its spread over trials."""
+    trials = [log(trial) for trial in range(1000)]
+    for unit in (
+        np.array([dvl.scale - 1.0 for dvl in trials]) / 0.002,
+        np.degrees([dvl.misalignment for dvl in trials]) / 0.3,
+        np.array([dvl.biases for dvl in trials]).ravel() / 0.002,
+    ):
+        low, high = chi2.ppf([1e-5, 1 - 1e-5], unit.size)
+        assert low < np.square(unit).sum() < high
+
+
+def test_misalignment_turns_what_is_measured_the_other_way() -> None:
+    """A transducer turned to starboard sees a vehicle that goes straight ahead go to port."""
+    dvl = log(**{**EXACT, "misalignment_deg": 5.0})
+    value = dvl.measure(truth()).value
+    for exact, measured in ((np.array(NU[:2]), value[:2]), (through_water(truth().current)[:2], value[3:5])):
+        angle = math.atan2(measured[1], measured[0]) - math.atan2(exact[1], exact[0])
+        assert angle == pytest.approx(-dvl.misalignment, abs=1e-12)  # rounding
+        assert np.hypot(*measured) == pytest.approx(np.hypot(*exact), rel=1e-12)
+
+
+def test_water_track_is_relative_to_the_layer_below() -> None:
+    """In a sheared current it is the water in the layer's middle, not that round the vehicle, that counts."""
+    points = (ShearPoint(depth=0.0, speed=0.5), ShearPoint(depth=20.0, speed=0.1))
+    shear = field(ShearSettings(profile="linear", points=points))
+    value = log(current=shear, **EXACT, water_layer=(4.0, 8.0)).measure(truth(current=shear)).value
+    below = np.array([0.5 - 0.02 * 16.0, 0.0, 0.0])  # 10 m deep, layer 6 m below
+    np.testing.assert_allclose(value[3:], through_water(below), atol=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("altitude", "bottom", "water"),
+    [
+        (0.4, False, False),
+        (0.6, True, False),
+        (9.9, True, False),
+        (10.1, True, True),
+        (64.0, True, True),
+        (66.0, False, True),
+    ],
+)
+def test_limits_of_altitude(altitude: float, bottom: bool, water: bool) -> None:
+    """Bottom from 0.5 to 65 m; water while the layer's far edge, 8 m, is within 80 % of the altitude."""
+    value = log(floor=100.0, **EXACT).measure(truth(100.0 - altitude)).value
+    assert np.isfinite(value).tolist() == [bottom] * 3 + [water] * 3
+
+
+def test_dropouts_come_as_often_as_set_on_each_track() -> None:
+    """Each track whole or lost, by itself: counts inside their binomial intervals."""
+    dvl = log(dropout_probability=0.2)
+    lost = np.isnan([dvl.measure(truth()).value for _ in range(5000)])
+    assert (lost[:, :3] == lost[:, :1]).all()
+    assert (lost[:, 3:] == lost[:, 3:4]).all()
+    for count, share in ((lost[:, 0].sum(), 0.2), (lost[:, 3].sum(), 0.2), ((lost[:, 0] & lost[:, 3]).sum(), 0.04)):
+        low, high = binom.ppf([1e-5, 1 - 1e-5], 5000, share)
+        assert low <= count <= high
+
+
+def test_a_lost_reading_changes_no_other() -> None:
+    """The same draws a reading, lost or not: what arrives is the same to the last bit."""
+    whole, holed = log(dropout_probability=0.0), log(dropout_probability=0.5)
+    for index in range(700):  # more than one block of draws
+        first, second = whole.measure(truth()), holed.measure(truth())
+        assert first.sequence == second.sequence == index
+        kept = np.isfinite(second.value)
+        np.testing.assert_array_equal(first.value[kept], second.value[kept])
+
+
+@pytest.mark.parametrize(
+    ("data", "text"),
+    [
+        ({"bottom_noise": (0.1, -0.1, 0.1)}, "must be >= 0"),
+        ({"maximum_altitude": 0.4}, "must be more than minimum_altitude, 0.5 m"),
+        ({"water_layer": (8.0, 2.0)}, "near < far"),
+        ({"dropout_probability": 1.1}, "less than or equal to 1"),
+        ({"rate": 0.0}, "greater than 0"),
+    ],
+)
+def test_bad_settings_are_refused(data: dict, text: str) -> None:
+    """One line each."""
+    with pytest.raises(ValidationError, match=text):
+        DvlSettings(**data)
