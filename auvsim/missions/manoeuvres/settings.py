@@ -200,3 +200,10 @@ ManoeuvreSettings = Annotated[
     Field(discriminator="kind"),
 ]
 SequenceSettings.model_rebuild()
+
+
+class ManoeuvreMissionSettings(Settings):
+    """A manoeuvre, from which the vehicle is identified, instead of docking."""
+
+    kind: Literal["manoeuvre"] = "manoeuvre"
+    manoeuvre: ManoeuvreSettings = Field(description="what the vehicle does, by its `kind`")

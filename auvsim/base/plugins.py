@@ -1,0 +1,56 @@
+"""Parts of a user's own, named `package.module:Name` where the name of a shipped one could stand."""
+
+import importlib
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeVar
+
+from auvsim.base.errors import InputError, unknown_name
+
+Part = TypeVar("Part")
+
+
+def is_own(name: str) -> bool:
+    """Whether a name is that of a user's own part."""
+    return ":" in name
+
+
+def find(what: str, name: str, shipped: Mapping[str, Part]) -> Part | Any:
+    """A part by the name of a shipped one or as `package.module:Name`, looked for in the working folder too.
+
+    Args:
+        what: is looked for, for errors: "estimator".
+        name: of it.
+        shipped: those that have names.
+
+    Raises:
+        InputError: there is none, or its module cannot be imported.
+    """
+    if name in shipped:
+        return shipped[name]
+    if not is_own(name):
+        raise unknown_name(what, name, [*shipped, "package.module:Name of your own"])
+    module, _, attribute = name.partition(":")
+    folder = str(Path.cwd())
+    if folder not in sys.path:
+        sys.path.append(folder)
+    try:
+        return getattr(importlib.import_module(module), attribute)
+    except Exception as error:  # a user's module may fail in any way while it is imported
+        raise InputError(f"{what} '{name}': {type(error).__name__}: {error}") from None
+
+
+def settings_of(part: Any, given: Mapping[str, Any], where: str) -> Any:
+    """The settings of a user's own part: checked by its class `Settings` if it has one, else as they were given.
+
+    Raises:
+        InputError: its class refuses them.
+    """
+    of_its_own = getattr(part, "Settings", None)
+    if of_its_own is None:
+        return dict(given)
+    try:
+        return of_its_own(**given)
+    except Exception as error:  # of pydantic, or whatever a class of the user's own raises
+        raise InputError(f"{where}: {' '.join(str(error).split())[:300]}") from None

@@ -1,0 +1,79 @@
+"""What a scenario says of an estimator: its kind, and what it assumes of the noises."""
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from auvsim.base.settings import OwnPart, Settings, tell
+
+
+class _Assumed(Settings):
+    """The planar model that an estimator assumes."""
+
+    model: str = Field(
+        default="condense",
+        description="planar model it assumes: condense (fitted to the vehicle in MuJoCo), a name in "
+        "models/<vehicle>/planar/, or the path of a .yaml",
+    )
+    model_speed: float = Field(
+        default=1.0, gt=0, description="speed through the water at which the planar model is fitted [m/s]"
+    )
+
+
+class PaperSettings(_Assumed):
+    """Paper 1's filter and its halves, with the noises that the paper recommends."""
+
+    kind: Literal["paper", "current_only", "delay_only", "regular_ekf"] = "paper"
+    compass_deg: float = Field(default=1.0, gt=0, description="compass noise it assumes, each reading [deg]")
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+
+
+class AugmentedSettings(_Assumed):
+    """Kalman filters with the current in their state."""
+
+    kind: Literal["augmented_ekf", "ukf"] = Field(
+        default="augmented_ekf",
+        description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, or "
+        "package.module:factory",
+    )
+    compass_deg: float = Field(default=1.0, gt=0, description="compass noise it assumes, each reading [deg]")
+    position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
+    heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
+    velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_rate_noise: float = Field(default=1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
+    current_noise: float = Field(
+        default=3e-6, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
+    )
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+    dock_heading_state: bool = Field(
+        default=True, description="whether that error is constant, and estimated, instead of new with each fix"
+    )
+
+
+class InteractingSettings(AugmentedSettings):
+    """Interacting filters, for currents that may turn."""
+
+    kind: Literal["imm", "imm_biased"] = "imm"  # pyright: ignore[reportIncompatibleVariableOverride]
+    steady_noise: float = Field(
+        default=1e-6, ge=0, description="random walk of the current in the steady modes of the imm [m2/s3]"
+    )
+    turning_noise: float = Field(
+        default=0.02, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
+    )
+    turn_interval: float = Field(default=300.0, gt=0, description="mean time between turns the imm expects [s]")
+    compass_bias_deg: float = Field(
+        default=0.5, ge=0, description="constant error of the vehicle's compass that the imm estimates [deg]"
+    )
+
+
+class OwnEstimator(OwnPart, _Assumed):
+    """An estimator of the user's own, made by a factory."""
+
+
+EstimatorSettings = Annotated[
+    Annotated[AugmentedSettings, Tag("AugmentedSettings")]
+    | Annotated[InteractingSettings, Tag("InteractingSettings")]
+    | Annotated[PaperSettings, Tag("PaperSettings")]
+    | Annotated[OwnEstimator, Tag("OwnEstimator")],
+    Discriminator(tell(AugmentedSettings, InteractingSettings, PaperSettings, OwnEstimator)),
+]

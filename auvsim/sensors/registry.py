@@ -1,0 +1,51 @@
+"""The sensors by their kinds, and how one is made for a vehicle."""
+
+from collections.abc import Callable
+from typing import Any
+
+from numpy.random import Generator
+
+from auvsim.base import plugins
+from auvsim.base.errors import AuvsimError, InputError
+from auvsim.sensors.compass import Compass
+from auvsim.sensors.depth import Depth
+from auvsim.sensors.dvl import Dvl
+from auvsim.sensors.feedback import Feedback
+from auvsim.sensors.gyro import Gyro
+from auvsim.sensors.range import Range
+from auvsim.sensors.sensor import Sensor
+from auvsim.vehicles.library import Vehicle
+
+STANDARD: tuple[type[Sensor], ...] = (Compass, Depth, Feedback, Dvl, Gyro)  # every vehicle has settings for them
+SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range)}
+
+
+def find(kind: str) -> Callable[..., Sensor]:
+    """The class of a kind, or a user's own as `package.module:Class`.
+
+    Raises:
+        InputError: there is none.
+    """
+    return plugins.find("sensor", kind, SENSORS)
+
+
+def build(kind: str, settings: Any, generator: Generator, *, name: str, vehicle: Vehicle) -> Sensor:
+    """Makes a sensor of a vehicle.
+
+    Args:
+        kind: of it.
+        settings: of its class; of a user's own, what stands under `settings`.
+        generator: of its noise.
+        name: of this instance.
+        vehicle: that carries it.
+
+    Raises:
+        InputError: there is no such kind, or a user's own cannot be made.
+    """
+    made = find(kind)
+    try:
+        return made(settings, generator, name=name, vehicle=vehicle)
+    except AuvsimError:
+        raise
+    except Exception as error:  # a user's class may fail in any way
+        raise InputError(f"sensor '{name}' ({kind}) cannot be made: {type(error).__name__}: {error}") from error

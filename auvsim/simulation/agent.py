@@ -1,0 +1,210 @@
+"""One vehicle's mind: its sensors, estimator, mission and controller, and one turn of each."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from numpy.random import Generator
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base import plugins
+from auvsim.base.reading import Reading
+from auvsim.control import registry as controllers
+from auvsim.control.controller import ControllerSetup
+from auvsim.data.variables import Group, Table, Variable, vehicle_groups
+from auvsim.missions import registry as missions
+from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
+from auvsim.navigation import registry as estimators
+from auvsim.navigation.estimate import Estimate, estimator_events
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.physics import planar_sets
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.truth import Truth
+from auvsim.sensors import registry as sensors
+from auvsim.sensors.sensor import Surroundings
+from auvsim.simulation.scenario import Scenario
+from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.vehicles.library import Vehicle
+
+
+class Log(Protocol):
+    """Where an agent writes down what happens to it; `data.recorder.Recorder` is one."""
+
+    def append(self, group: str, row: Sequence[Any]) -> None:
+        """A row of a group."""
+        ...
+
+    def reading(self, vehicle: str, reading: Reading, *extra: Any) -> None:
+        """A reading of a sensor."""
+        ...
+
+    def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
+        """Something that happened."""
+        ...
+
+
+class Agent:
+    """A vehicle that senses, navigates and acts.
+
+    Args:
+        name: of the vehicle.
+        plan: the scenario.
+        vehicle: its model.
+        places: the structures that are charted, by name.
+        noise: gives the generator of each source of noise of this vehicle.
+        navigator: in place of the scenario's.
+        mission: likewise.
+
+    Raises:
+        InputError: one of its parts cannot be made.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        plan: Scenario,
+        vehicle: Vehicle,
+        places: Mapping[str, Place],
+        noise: Callable[[str], Generator],
+        *,
+        navigator: Navigator | None = None,
+        mission: Mission | None = None,
+    ) -> None:
+        self.name, self.vehicle = name, vehicle
+        settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
+        start, assumed = settings.start, settings.estimator
+        model_speed = getattr(assumed, "model_speed", 1.0)
+        # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
+        # estimator.
+        fitted = fit_planar_model(settings.model, model_speed, density)
+        self.shaft_speed = fitted.shaft_speed_for
+        heading = math.radians(start.heading_deg)
+        self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
+        self.navigator = navigator or estimators.build(
+            NavigatorSetup(
+                vehicle=name,
+                settings=assumed,
+                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
+                actuation=vehicle.actuation,
+                period=1.0 / rates.filter,
+                rates=dict(rated(settings.sensors)),
+                usbl=settings.sensors.usbl,
+                dock=places[self.dock].pose if self.dock else None,
+            )
+        )
+        self.mission = mission or missions.build(
+            settings.mission.kind,
+            MissionSetup(
+                name=name,
+                settings=settings.mission,
+                vehicle=vehicle,
+                heading=heading,
+                depth=start.depth,
+                period=1.0 / rates.control,
+                holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
+                structures=places,
+            ),
+        )
+        self.controller = controllers.build(
+            settings.control.kind,
+            ControllerSetup(
+                settings=settings.control,
+                actuation=vehicle.actuation,
+                shaft_speed=fitted.shaft_speed_for,
+                period=1.0 / rates.control,
+            ),
+        )
+        self.sensors = [
+            (_sensor(key, found, noise(key), vehicle), round(rates.control / found.rate))
+            for key, found in on_board(settings.sensors)
+        ]
+        self.estimate: Estimate | None = None
+        self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
+        self._filter_ticks = round(rates.control / rates.filter)
+        self._readings: list[Reading] = []  # of this control period
+        self._messages: list[Delivery] = []
+        self._to_filter: list[Reading] = []  # since the last update of the estimator
+        self._messages_to_filter: list[Delivery] = []
+        self._to_mission: list[Reading] = []  # since the last update of the mission
+        self._end = math.inf
+        self.over = False
+
+    def groups(self, usbl: tuple[Table, Mapping[str, int]] | None) -> dict[str, Group]:
+        """The groups of the vehicle in the log.
+
+        Args:
+            usbl: variables and sizes of the dock's USBL, if one serves the vehicle.
+        """
+        actuation = self.vehicle.actuation
+        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _ in self.sensors} | ({"usbl": usbl} if usbl else {})
+        return vehicle_groups(
+            sensors=of_sensors,
+            mission=(self.mission.phases, self.mission.variables),
+            demands={d.name: Variable((), "float64", d.units, d.long_name) for d in actuation.demands},
+            channels=dict(zip(actuation.channels, actuation.units, strict=True)),
+            states=self.navigator.states,
+        )
+
+    def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
+        """Takes the readings that are due at a control tick."""
+        self._readings, self._messages = [], []
+        for sensor, every in self.sensors:
+            if ticks % every == 0 and (reading := sensor.measure(truth, world)) is not None:
+                log.reading(self.name, reading)
+                self._readings.append(reading)
+
+    def receive(self, deliveries: Sequence[Delivery]) -> None:
+        """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
+        for delivery in deliveries:
+            self._messages.append(delivery)
+            if delivery.message.kind == "usbl":
+                self._readings.append(delivery.message.payload.reading._replace(received=delivery.received))
+
+    def navigate(self, ticks: int, time: float, log: Log) -> None:
+        """Hands all that arrived to the controller and, when it is due, to the estimator."""
+        self.controller.observe(self._readings)
+        self._to_filter += self._readings
+        self._to_mission += self._readings
+        self._messages_to_filter += self._messages
+        # Held fast, the vehicle does not move as any model of free motion says: nothing is estimated.
+        if ticks % self._filter_ticks or self.mission.at_rest:
+            return
+        e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+        self._to_filter, self._messages_to_filter = [], []
+        for kind, text in estimator_events(self.estimate, e):
+            log.event(time, self.name, kind, text)
+        self.estimate = e
+        views = (e.position, e.heading, e.velocity, e.current)
+        log.append(self._path("estimate"), (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
+        for o in e.outcomes:
+            log.append(self._path("measurements"), (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
+
+    def act(self, time: float, latched: str | None, log: Log) -> Any:
+        """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""
+        mission, controller = self.mission, self.controller
+        heading, depth = controller.heading, controller.depth
+        if heading is None or depth is None:
+            return None
+        readings, self._to_mission = self._to_mission, []
+        wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
+        self.commands = controller.command(wanted)
+        log.append(self._path("mission"), (time, mission.phase, *wanted[:3], *mission.row()))
+        log.append(self._path("command"), (time, *self.commands))
+        for event in mission.events:
+            log.event(event.time, self.name, event.kind, event.text)
+        mission.events.clear()
+        if mission.finished and self._end == math.inf:
+            self._end = time + mission.aftermath
+        self.over = time >= self._end
+        return self.commands
+
+    def _path(self, group: str) -> str:
+        return f"vehicles/{self.name}/{group}"
+
+
+def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:
+    """A sensor by its name and settings; a standard one's kind is its name."""
+    kind = getattr(settings, "kind", name)
+    if plugins.is_own(kind):
+        settings = plugins.settings_of(sensors.find(kind), settings.settings, f"sensor '{name}': settings")
+    return sensors.build(kind, settings, generator, name=name, vehicle=vehicle)
