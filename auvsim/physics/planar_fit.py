@@ -11,6 +11,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.physics import hydrodynamics
 from auvsim.vehicles import library
+from auvsim.vehicles.actuation import Commands
 from estimators.planar.model import PlanarParameters
 
 _SAMPLES = 600
@@ -50,10 +51,10 @@ class _Level:
         self.model = mujoco.MjModel.from_xml_string(vehicle.root.to_xml_string(), vehicle.root.get_assets())
         hydrodynamics.equip(self.model, density)
         self.data = mujoco.MjData(self.model)
-        fins = [self.model.actuator(fin).trnid[0] for fin in vehicle.allocation.names]
+        fins = [self.model.actuator(fin).trnid[0] for fin in vehicle.actuation.fins]
         self._fins = [int(self.model.jnt_qposadr[joint]) for joint in fins]
         self._shaft = int(self.model.jnt_dofadr[self.model.actuator("shaft").trnid[0]])
-        self.allocation = vehicle.allocation
+        self.actuation = vehicle.actuation
         hull = next(b for b in hydrodynamics.bodies(self.model) if b.kind == "hull")
         self.added_mass = hull.fields["added_mass"]
         mujoco.mj_forward(self.model, self.data)
@@ -67,7 +68,7 @@ class _Level:
         """X, Y, N (3,) [N, N, N m] that act on the accelerations of a planar motion, SNAME signs."""
         data = self.data
         data.qpos[: self.model.nq] = self.model.qpos0
-        for at, angle in zip(self._fins, self.allocation.fins(rudder, 0.0), strict=True):
+        for at, angle in zip(self._fins, self.actuation.allocate(Commands(rudder, 0.0, 0.0))[:-1], strict=True):
             data.qpos[at] = angle
         data.qvel[:] = 0.0
         data.qvel[0], data.qvel[1], data.qvel[5] = u, -v, -r
@@ -100,7 +101,7 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
     generator = np.random.default_rng(0)
     draws = generator.uniform(-1.0, 1.0, (_SAMPLES, 5))
     u = speed * (1.0 + 0.35 * draws[:, 0])
-    rudder = level.allocation.limit * draws[:, 1]
+    rudder = level.actuation.fin_limit * draws[:, 1]
     n = shaft * (1.0 + 0.35 * draws[:, 2])
     v, r = 0.1 * u * draws[:, 3], 0.1 * u * draws[:, 4]
     parameters, _, _ = _fit(level, speed, u, v, r, rudder, n)
