@@ -1,0 +1,5 @@
+from auvsim.data.netcdf import Content
+
+
+def converted(found: Content, where: str) -> Content:
+    return found
