@@ -44,7 +44,9 @@ class Autopilot:
     def __init__(self, setup: ControllerSetup) -> None:
         actuation = setup.actuation
         if not isinstance(actuation, FinsAndShaft):
-            raise InputError(f"control.kind: torpedo steers by fins and a shaft, not by {', '.join(actuation.channels)}")
+            raise InputError(
+                f"control.kind: torpedo steers by fins and a shaft, not by {', '.join(actuation.channels)}"
+            )
         self._settings, self._shaft_for, self._period = setup.settings, setup.shaft_speed, setup.period
         self._fin_limit, self._shaft_limit = actuation.fin_limit, actuation.shaft_limit
         self._pitch_limit = math.radians(self._settings.pitch_limit_deg)

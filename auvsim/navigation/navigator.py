@@ -18,9 +18,7 @@ class Navigator(Protocol):
 
     states: Mapping[str, str]  # units of the estimated states by name, in their order; north and east first
 
-    def update(
-        self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any
-    ) -> Estimate:
+    def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate at a time.
 
         Args:

@@ -181,17 +181,17 @@ def load(name: str, vehicle: str) -> PlanarParameters:
     return found.planar()
 
 
-def believed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:
-    """The parameters that an estimator believes.
+def assumed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:
+    """The parameters of the planar model that an estimator assumes.
 
     Args:
         model: `condense`, or a set by name or path.
         vehicle: Name in models/, or the path of an MJCF file.
-        speed: At which to condense [m/s].
+        speed: Through the water, at which the model is fitted to the vehicle [m/s].
         density: Of the water [kg/m3].
 
     Raises:
-        InputError: As `load`, or as `condense`.
+        InputError: As `load`, or the model cannot be fitted at that speed.
     """
     if model == CONDENSE:
         return fit_planar_model(vehicle, speed, density).parameters

@@ -25,13 +25,14 @@ from auvsim.physics.truth import StructurePose
 from auvsim.vehicles import library
 from auvsim.water.terrain import FlatFloor, Terrain
 
+Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
 class WorldSettings(Settings):
     """What surrounds the vehicles."""
 
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
+    integrator: Integrator = Field(
         default="implicitfast",
         description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
     )

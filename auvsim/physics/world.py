@@ -79,6 +79,7 @@ class World:
             name: Craft(model, self.data, name, vehicle, slots[f"{name}/"]) for name, vehicle in scene.vehicles.items()
         }
         self.vehicles = tuple(self._craft)
+        self.models = scene.vehicles
         self._options, self._sensors = model.opt, self.data.sensordata
         active = self.data.eq_active
         self.structures: dict[str, StructureState] = {}

@@ -93,6 +93,7 @@ class Simulation:
         world: in place of MuJoCo's with the scenario's models: anything with its methods.
         navigators: in place of the scenario's, by vehicle.
         missions: likewise.
+        agents: makes the agent of a vehicle, see `Agent`.
         record: whether anything is logged.
         path: see `run`.
 
@@ -109,6 +110,7 @@ class Simulation:
         world: Any = None,
         navigators: Mapping[str, Navigator] | None = None,
         missions: Mapping[str, Mission] | None = None,
+        agents: Callable[..., Any] = Agent,
         record: bool = True,
         path: str | os.PathLike[str] | None = None,
     ) -> None:
@@ -118,19 +120,21 @@ class Simulation:
             return lambda source: stream(seed, trial, f"{vehicle}/{source}")
 
         self.world = world or build_world(scenario, current(scenario, seed, trial))
-        places = {
-            name: Place(name=name, pose=settings.pose, structure=library.structure(settings.model))
+        self._places = {
+            name: Place(name=name, pose=settings.pose, structure=_structure(self.world, name, settings.model))
             for name, settings in scenario.structures.items()
         }
         self.agents = [
-            Agent(
-                name, scenario, _vehicle(self.world, name, settings.model), places, noise(name),
+            agents(
+                name, scenario, _vehicle(self.world, name, settings.model), self._places, noise(name),
                 navigator=(navigators or {}).get(name), mission=(missions or {}).get(name),
             )
             for name, settings in scenario.vehicles.items()
         ]  # fmt: skip
         self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.dock]
-        links = {usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl}
+        links = {
+            usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
+        }
         self.network = Network(links, self._usbl)
         self._physics_ticks = round(rates.physics / rates.control)
         self._log_ticks = max(1, round(rates.control / rates.log))
@@ -170,9 +174,13 @@ class Simulation:
         for agent in self.agents:
             agent.sense(self.ticks, self.truths[agent.name], world, log)
         for ping, fate in self.network.poll(before, self.truths):
-            log.reading(fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier)
+            log.reading(
+                fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
+            )
             m = fate.message
-            log.append("network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate))
+            log.append(
+                "network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
+            )
         for agent in self.agents:
             agent.receive(self.network.deliver(agent.name, time))
             agent.navigate(self.ticks, time, log)
@@ -208,8 +216,10 @@ class Simulation:
 
     def _tell_of_approach(self, agent: Agent) -> None:
         """Tells currents that turn in approaches how far the first vehicle is on its approach to a dock."""
+        if not self._listeners or agent.mission is None:
+            return
         attempt, dock = agent.mission.approach, agent.mission.dock
-        if self._listeners and attempt is not None and dock is not None and agent is self.agents[0]:
+        if attempt is not None and dock is not None and agent is self.agents[0]:
             away = self.truths[agent.name].position[:2] - dock.pose.position[:2]
             for listener in self._listeners:
                 listener.approach(attempt, float(np.hypot(*away)), self.time)
@@ -238,8 +248,13 @@ class Simulation:
             attributes |= {"latitude": scenario.datum.latitude, "longitude": scenario.datum.longitude}
         of_groups = {f"vehicles/{agent.name}": self._attributes_of(agent) for agent in self.agents}
         of_groups |= {
-            f"structures/{name}": {"model": settings.model, **library.structure(settings.model).dimensions}
-            | {"north": settings.north, "east": settings.east, "depth": settings.depth, "heading": settings.pose.heading}
+            f"structures/{name}": {"model": settings.model, **self._places[name].structure.dimensions}
+            | {
+                "north": settings.north,
+                "east": settings.east,
+                "depth": settings.depth,
+                "heading": settings.pose.heading,
+            }
             for name, settings in scenario.structures.items()
         }
         return Recorder(groups, attributes, of_groups, path)
@@ -308,3 +323,8 @@ def _vehicle(world: Any, name: str, model: str) -> library.Vehicle:
     """The model of a vehicle, which the world has loaded already, or else is loaded."""
     known = getattr(world, "models", {})
     return known[name] if name in known else library.vehicle(model)
+
+
+def _structure(world: Any, name: str, model: str) -> library.Structure:
+    """The model of a structure, likewise."""
+    return world.structures[name].structure if name in world.structures else library.structure(model)

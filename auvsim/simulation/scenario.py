@@ -9,7 +9,6 @@ from pydantic import Field, StringConstraints, ValidationError, model_validator
 
 from auvsim.acoustics.link import AcousticSettings
 from auvsim.base import schema, yaml_text
-from auvsim.base.datum import DatumSettings
 from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
 from auvsim.control.registry import ControlSettings
@@ -17,12 +16,25 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
-from auvsim.physics.world import WorldSettings
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.water.settings import CurrentSettings, UniformSettings
 
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w-]{0,63}$")]
+
+
+class DatumSettings(Settings):
+    """Where on the earth the origin of NED is; only what speaks of latitudes needs to know."""
+
+    latitude: float | None = Field(default=None, ge=-90, le=90, description="of the origin, WGS84 [deg]")
+    longitude: float | None = Field(default=None, ge=-180, le=180, description="likewise [deg]")
+
+    @model_validator(mode="after")
+    def _whole(self) -> "DatumSettings":
+        if (self.latitude is None) != (self.longitude is None):
+            raise ValueError("latitude and longitude go together: give both or neither")
+        return self
 
 
 class Rates(Settings):
@@ -83,9 +95,7 @@ class StructureSettings(Settings):
     @property
     def pose(self) -> StructurePose:
         """Where it is."""
-        return StructurePose(
-            north=self.north, east=self.east, depth=self.depth, heading=math.radians(self.heading_deg)
-        )
+        return StructurePose(north=self.north, east=self.east, depth=self.depth, heading=math.radians(self.heading_deg))
 
 
 class WaterSettings(Settings):
@@ -101,7 +111,9 @@ class WaterSettings(Settings):
 class PhysicsSettings(Settings):
     """How the dynamics are stepped."""
 
-    integrator: str = Field(default="implicitfast", description="MuJoCo's: Euler, implicit, implicitfast or RK4")
+    integrator: Integrator = Field(
+        default=WorldSettings().integrator, description=WorldSettings.model_fields["integrator"].description
+    )
 
 
 class NetworkSettings(Settings):
@@ -161,7 +173,7 @@ class Scenario(Settings):
     def world(self) -> WorldSettings:
         """What the physics needs."""
         return WorldSettings(
-            integrator=self.physics.integrator,  # pyright: ignore[reportArgumentType] (checked there)
+            integrator=self.physics.integrator,
             water_density=self.water.density,
             sea_floor=self.water.sea_floor,
         )

@@ -11,7 +11,6 @@ from pydantic import Field, ValidationError
 
 from auvsim.acoustics.link import AcousticSettings
 from auvsim.base import schema
-from auvsim.base.datum import DatumSettings
 from auvsim.base.errors import InputError
 from auvsim.base.settings import OwnPart, Settings, kinds
 from auvsim.control.registry import ControlSettings
@@ -20,8 +19,8 @@ from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
-from auvsim.physics.world import WorldSettings
-from auvsim.simulation.scenario import Rates, Scenario, Start, StructureSettings, validated
+from auvsim.physics.scenes import WorldSettings
+from auvsim.simulation.scenario import DatumSettings, Rates, Scenario, Start, StructureSettings, validated
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings

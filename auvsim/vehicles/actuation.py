@@ -42,6 +42,11 @@ class Actuation(Protocol):
         ...
 
     @property
+    def units(self) -> tuple[str, ...]:
+        """Units of the channels."""
+        ...
+
+    @property
     def lags(self) -> Array:
         """Time constant of each channel (n,) [s]."""
         ...
@@ -76,7 +81,7 @@ class FinsAndShaft:
     demands = (
         Demand("rudder", "rad", "effective rudder, positive to starboard"),
         Demand("elevator", "rad", "effective stern plane, positive dives"),
-        Demand("shaft_speed", "rad s-1", "propeller shaft speed"),
+        Demand("shaft_speed", "rad/s", "propeller shaft speed"),
     )
 
     def __post_init__(self) -> None:
@@ -96,6 +101,15 @@ class FinsAndShaft:
     def channels(self) -> tuple[str, ...]:
         """Fin actuators, then `shaft`."""
         return (*self.fins, "shaft")
+
+    @cached_property
+    def units(self) -> tuple[str, ...]:
+        """Units of the channels."""
+        return (*("rad" for _ in self.fins), "rad/s")
+
+    def at_speed(self, shaft_speed: float) -> Commands:
+        """Straight ahead with a shaft speed [rad/s]."""
+        return Commands(0.0, 0.0, shaft_speed)
 
     @cached_property
     def fin_limit(self) -> float:

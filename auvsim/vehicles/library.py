@@ -1,5 +1,6 @@
 """Finds models/ (in a checkout or in the installed package) and loads vehicles and structures as PyMJCF elements."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,8 +39,15 @@ class Structure:
     throat_length: float  # end of the cone to the stop along the axis [m]
     latched: float  # where the latch holds the nose, along the axis from the mouth [m]
 
+    @property
+    def dimensions(self) -> dict[str, float]:
+        """Its dimensions by name [m]."""
+        names = ("mouth_radius", "throat_radius", "cone_length", "throat_length", "latched")
+        return {name: getattr(self, name) for name in names}
+
 
 PACKAGE = Path(auvsim.__file__).parent
+_MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
 _MARKS = {"vehicle": '<body name="hull"', "structure": '<site name="capture"'}  # what every MJCF of a kind has
 
 
@@ -82,6 +90,13 @@ def source(kind: str, name: str) -> tuple[Path, str]:
     """The MJCF file of a model and its text now; arguments and errors as of `find`."""
     path = find(kind, name)
     return path, _read(path)
+
+
+def model_name(kind: str, name: str) -> str:
+    """Name of a model as its MJCF says it, without loading it; arguments and errors as of `find`."""
+    _, text = source(kind, name)
+    found = _MODEL.search(text)
+    return found.group(1) if found else "unnamed"
 
 
 def _parse(path: Path, text: str) -> Any:

@@ -273,3 +273,8 @@ def build_current(settings: CurrentSettings, generator: Generator, duration: flo
 def _horizontal(speed: float, direction_deg: float) -> tuple[float, float]:
     direction = math.radians(direction_deg)
     return speed * math.cos(direction), speed * math.sin(direction)
+
+
+def listeners(field: CurrentField) -> tuple[CurrentField, ...]:
+    """The fields that want to be told of approaches."""
+    return () if field.steady_uniform else (field,)

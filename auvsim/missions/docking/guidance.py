@@ -47,7 +47,9 @@ class Phase(IntEnum):
 class DockingSettings(Settings):
     """Docking: how the vehicle comes in."""
 
-    kind: Literal["docking"] = Field(default="docking", description="docking, manoeuvre, track, or package.module:Class")
+    kind: Literal["docking"] = Field(
+        default="docking", description="docking, manoeuvre, track, or package.module:Class"
+    )
     dock: str | None = Field(default=None, description="name of the structure to dock at; none: the only one")
     homing_speed: float = Field(default=1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
     approach_speed: float = Field(default=1.0, gt=0, description="speed through the water on the approach [m/s]")

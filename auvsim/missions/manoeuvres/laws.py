@@ -6,7 +6,7 @@ excitations: multisine, pseudo-random binary sequence, any table.
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
