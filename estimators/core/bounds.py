@@ -14,8 +14,9 @@ from estimators.core import loops
 from estimators.core.ekf import Innovation
 from estimators.core.errors import NotPositiveDefiniteError
 from estimators.core.history import Input, Node
-from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
+from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel, Verdict, Verdicts
 
+NO_MODEL = "no_model"  # why a measurement is refused of whose kind a filter knows nothing
 Truths = Callable[[float], Array]  # time [s] -> true states (k, n), one of each sampled trajectory
 
 
@@ -27,6 +28,7 @@ class BoundState(NamedTuple):
     mean: Array  # (n,) of the truths
     outliers: int = 0
     innovation: Innovation | None = None
+    verdicts: Verdicts = ()
 
     @property
     def belief(self) -> Gaussian:
@@ -64,8 +66,8 @@ class PosteriorBound:
         covariance = self._first(nodes, index)
         if covariance is None:
             return None
-        time = nodes[index].time
-        return BoundState(time, inverse(covariance), self._truths(time).mean(axis=0))
+        time, verdicts = nodes[index].time, tuple(map(Verdict, nodes[index].measurements))
+        return BoundState(time, inverse(covariance), self._truths(time).mean(axis=0), verdicts=verdicts)
 
     def predict(self, state: BoundState, u: Input, duration: float) -> BoundState:
         """The bound after `duration` [s].
@@ -89,12 +91,14 @@ class PosteriorBound:
     def correct(self, state: BoundState, node_time: float, measurements: Sequence[Measurement]) -> BoundState:
         """The bound with the information of a node's measurements."""
         information = state.information.copy()
+        verdicts = []
         for measurement in measurements:
             if (model := self._models.get(measurement.kind)) is not None:
                 for x in (truths := self._truths(node_time)):
                     H, R = model.jacobian(x), model.covariance(x, measurement)
                     information += H.T @ np.linalg.solve(R, H) / len(truths)
-        return BoundState(node_time, information, state.mean)
+            verdicts.append(Verdict(measurement, "" if model is not None else NO_MODEL))
+        return BoundState(node_time, information, state.mean, verdicts=tuple(verdicts))
 
 
 def inverse(matrix: Array) -> Array:

@@ -80,16 +80,16 @@ def correct_linear(
     return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation
 
 
-def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> Gaussian:
-    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns.
+def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> tuple[Gaussian, float]:
+    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns; and its NIS.
 
-    The same numbers as of `correct` in half its time, without what it says of the innovation.
+    The same numbers as of `correct` in half its time.
 
     Raises:
         NotPositiveDefiniteError, NotFiniteError: As `correct`.
     """
-    mean, covariance, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
+    mean, covariance, nis, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
     if status != loops.OK:
         residual = np.array([loops.wrap(value[0] - H[0] @ belief.mean)])
-        return correct_linear(belief, H, residual, R)[0]  # says what is wrong
-    return Gaussian(mean=mean, covariance=covariance)
+        correct_linear(belief, H, residual, R)  # says what is wrong
+    return Gaussian(mean=mean, covariance=covariance), nis

@@ -1,8 +1,9 @@
 """What filters pass round: beliefs, measurements, and the two kinds of model a user may bring."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +29,34 @@ class Measurement:
     stamp: float  # when it was true [s]
     received: float  # when it arrived [s]
     sequence: int | None = None  # counts one sensor's measurements; None if the sensor does not count
+    source: str = ""  # which of several alike: a beacon, a landmark, another vehicle
+
+
+class Verdict(NamedTuple):
+    """What a filter decided about a measurement; a plain tuple of the same three will do where time is short."""
+
+    measurement: Measurement
+    reason: str = ""  # why it was refused; "" if it was used
+    nis: float = math.nan  # its normalised innovation squared; NaN if none was computed
+
+
+Verdicts = tuple[tuple[Measurement, str, float], ...]
+
+
+class Outcome(NamedTuple):
+    """The fate of one measurement.
+
+    A later outcome of the same measurement (kind, source, stamp and sequence) replaces an earlier one: late packets
+    are replayed, and a filter that recovers takes what it had refused before.
+    """
+
+    kind: str
+    source: str
+    stamp: float  # when it was true [s]
+    sequence: int  # -1 if the sensor does not count
+    accepted: bool
+    reason: str  # "" if accepted
+    nis: float  # NaN if it was not judged by one
 
 
 class ProcessModel(Protocol):

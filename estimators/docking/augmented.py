@@ -8,9 +8,9 @@ from estimators.core.consistency import chi_square
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
 from estimators.core.history import Input, Node
-from estimators.core.types import Gaussian, Measurement
+from estimators.core.types import Gaussian, Measurement, Verdicts
 from estimators.docking import recovery
-from estimators.docking.models import COMPASS, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.models import COMPASS, OUTLIER, USBL, DockingNoise, ModelOptions, PlanarModels, first_verdicts
 from estimators.docking.recovery import Rejected
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
@@ -25,6 +25,7 @@ class AugmentedState(NamedTuple):
     outliers: int = 0  # fixes rejected so far
     rejected: tuple[Rejected, ...] = ()
     innovation: Innovation | None = None  # of the last fix
+    verdicts: Verdicts = ()  # on this node's measurements, and revised ones
 
 
 class AugmentedFilter:
@@ -79,7 +80,8 @@ class AugmentedFilter:
             return None
         belief, fix = first
         others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        return self.correct(AugmentedState(belief), nodes[index].time, others)
+        state = self.correct(AugmentedState(belief), nodes[index].time, others)
+        return state._replace(verdicts=first_verdicts(nodes[index], fix) + state.verdicts)
 
     def predict(self, state: AugmentedState, u: Input, duration: float) -> AugmentedState:
         """State after `duration` [s]."""
@@ -90,8 +92,9 @@ class AugmentedFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                belief = self.models.fuse_heading(state.belief, measurement)
-                state = AugmentedState(belief, state.outliers, state.rejected, state.innovation)
+                belief, nis = self.models.fuse_heading(state.belief, measurement)
+                verdicts = (*state.verdicts, (measurement, "", nis))
+                state = AugmentedState(belief, state.outliers, state.rejected, state.innovation, verdicts)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)
         return state
@@ -103,15 +106,19 @@ class AugmentedFilter:
     def _fuse_fix(self, state: AugmentedState, fix: Measurement) -> AugmentedState:
         position = self.models.position
         belief, innovation = self._kalman.correct(state.belief, fix, position, self._gate)
-        if innovation.accepted and (not state.rejected or innovation.nis <= chi_square(recovery.PROBABLE, 2)):
-            return AugmentedState(belief, state.outliers, (), innovation)
-        now = Rejected(fix.stamp, innovation.residual, position.jacobian(state.belief.mean), fix.covariance)
+        nis = innovation.nis
+        accepted = (*state.verdicts, (fix, "", nis))
+        if innovation.accepted and (not state.rejected or nis <= chi_square(recovery.PROBABLE, 2)):
+            return AugmentedState(belief, state.outliers, (), innovation, accepted)
+        now = Rejected(fix, innovation.residual, position.jacobian(state.belief.mean), nis)
         for earlier in recovery.agreeing(now, state.rejected, self.noise)[:1]:
             recovered = recovery.recover(state.belief, earlier, now, self.noise)
-            return AugmentedState(recovered, state.outliers - 1, (), innovation)
+            return AugmentedState(recovered, state.outliers - 1, (), innovation, (*accepted, earlier.taken))
         if innovation.accepted:
-            return AugmentedState(belief, state.outliers, (), innovation)
+            return AugmentedState(belief, state.outliers, (), innovation, accepted)
         if len(state.rejected) >= recovery.REMEMBERED:
-            recovered = recovery.recover(state.belief, state.rejected[-1], now, self.noise)
-            return AugmentedState(recovered, state.outliers, (), innovation)
-        return AugmentedState(state.belief, state.outliers + 1, (*state.rejected, now), innovation)
+            earlier = state.rejected[-1]
+            recovered = recovery.recover(state.belief, earlier, now, self.noise)
+            return AugmentedState(recovered, state.outliers, (), innovation, (*accepted, earlier.taken))
+        verdicts = (*state.verdicts, (fix, OUTLIER, nis))
+        return AugmentedState(state.belief, state.outliers + 1, (*state.rejected, now), innovation, verdicts)

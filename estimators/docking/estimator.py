@@ -7,6 +7,7 @@ arrives. Eq. 7 (into the world) is in `usbl`, eq. 11 (the current) here. World a
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from typing import Any, NamedTuple, Protocol, Unpack
 
 import numpy as np
@@ -16,7 +17,7 @@ from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
 from estimators.core.history import Filter, History, Input, Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, Outcome, Verdicts
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.interacting import InteractingFilter
 from estimators.docking.models import (
@@ -31,8 +32,9 @@ from estimators.docking.models import (
     DockingNoise,
     ModelOptions,
     PlanarModels,
+    first_verdicts,
 )
-from estimators.docking.usbl import UsblFix, UsblModel, horizontal_rotation
+from estimators.docking.usbl import UsblFix, UsblModel, horizontal_rotation, raw_fix
 from estimators.planar.model import PlanarParameters
 
 __all__ = [
@@ -84,6 +86,7 @@ class PaperState(NamedTuple):
     last_fix: float  # stamp of the fix before [s]
     innovation: Innovation | None = None  # of the last fix
     outliers: int = 0  # it has no gate
+    verdicts: Verdicts = ()  # on this node's measurements
 
 
 class PaperFilter:
@@ -127,7 +130,8 @@ class PaperFilter:
         memory = 0 if self._weights is None else len(self._weights) - 1
         state = PaperState(belief, ((0.0, 0.0),) * memory, fix.stamp)
         others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        return self.correct(state, nodes[index].time, others)
+        state = self.correct(state, nodes[index].time, others)
+        return state._replace(verdicts=first_verdicts(nodes[index], fix) + state.verdicts)
 
     def predict(self, state: PaperState, u: Input, duration: float) -> PaperState:
         """State after `duration` [s]; eq. 12."""
@@ -138,8 +142,9 @@ class PaperFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                belief = self.models.fuse_heading(state.belief, measurement)
-                state = PaperState(belief, state.currents, state.last_fix, state.innovation)
+                belief, nis = self.models.fuse_heading(state.belief, measurement)
+                verdicts = (*state.verdicts, (measurement, "", nis))
+                state = PaperState(belief, state.currents, state.last_fix, state.innovation, 0, verdicts)
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)
         return state
@@ -147,12 +152,13 @@ class PaperFilter:
     def _fuse_fix(self, state: PaperState, fix: Measurement) -> PaperState:
         belief, innovation = ekf.correct(state.belief, fix, self.models.position)
         interval = fix.stamp - state.last_fix
+        verdicts = (*state.verdicts, (fix, "", innovation.nis))
         if self._weights is None or abs(interval) < 1e-6:
-            return state._replace(belief=belief, innovation=innovation)
+            return state._replace(belief=belief, innovation=innovation, verdicts=verdicts)
         gain = innovation.gain[:2, :2]
         current = estimate_current(state.currents, self._weights, gain, innovation.residual, interval)
         belief.mean[6:] = current
-        return PaperState(belief, (*state.currents[1:], current), fix.stamp, innovation)
+        return PaperState(belief, (*state.currents[1:], current), fix.stamp, innovation, 0, verdicts)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -167,12 +173,15 @@ class DockingEstimate:
     refused: Mapping[str, int]  # measurements refused so far, by reason; "outlier" by the filter's gate
     reinitialised: int = 0  # how often the filter had to start anew, because its numbers were no longer finite
     innovation: Innovation | None = None  # of the latest fix, by stamp, that the filter has seen
+    # Fates of measurements decided since the last tick. One whose verdict a replay or a recovery has changed is here
+    # again: of several outcomes of a measurement the last one holds.
+    outcomes: tuple[Outcome, ...] = ()
 
 
 class DockingFilter(Filter[Any], Protocol):
     """A filter for a `DockingEstimator`.
 
-    Its states have `belief` (eight states and biases), `outliers` and `innovation`.
+    Its states have `belief` (eight states and biases), `outliers`, `innovation` and `verdicts`, see `History`.
     """
 
     noise: DockingNoise
@@ -208,7 +217,9 @@ class DockingEstimator:
 
     def reset(self) -> None:
         """Forgets everything, counts included."""
-        self._history: History[Any] = History(self._filter, step=self._step, keep=self._keep)
+        self._history: History[Any] = History(
+            self._filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
+        )
         self._restarts = 0  # of the filter
         self._outliers_before = self._outliers = 0  # rejected before its last start, and in all
 
@@ -255,7 +266,7 @@ class DockingEstimator:
             if self._usbl.reaches(fix):
                 measurements.append(self._usbl.world_fix(fix))
             else:
-                history.refuse("implausible")
+                history.refuse("implausible", raw_fix(fix))
         if not self._compensate_delay:
             prompt += [replace(m, stamp=time) for m in measurements]
             measurements = []
@@ -284,4 +295,5 @@ class DockingEstimator:
             refused={**history.refused, "outlier": self._outliers},
             reinitialised=history.reinitialised,
             innovation=None if state is None else state.innovation,
+            outcomes=history.outcomes,
         )

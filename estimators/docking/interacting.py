@@ -12,9 +12,18 @@ from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
 from estimators.core.history import Input, Node
 from estimators.core.outliers import MixtureUpdate, Outliers
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, Verdicts
 from estimators.docking import recovery
-from estimators.docking.models import COMPASS, ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.models import (
+    COMPASS,
+    OUTLIER,
+    ROBUST_NOISE,
+    USBL,
+    DockingNoise,
+    ModelOptions,
+    PlanarModels,
+    first_verdicts,
+)
 from estimators.docking.recovery import Rejected
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
@@ -33,6 +42,7 @@ class InteractingState(NamedTuple):
     outliers: int = 0  # fixes more probably wrong than not, so far
     rejected: tuple[Rejected, ...] = ()
     innovation: Innovation | None = None  # of the last fix, in the mode most probable then
+    verdicts: Verdicts = ()  # on this node's measurements, and revised ones
 
     @property
     def belief(self) -> Gaussian:
@@ -90,12 +100,14 @@ class InteractingFilter:
         belief, fix = first
         others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
         state = InteractingState((belief,) * len(self._processes), self._initial, fix.stamp)
-        return self.correct(state, nodes[index].time, others)
+        state = self.correct(state, nodes[index].time, others)
+        return state._replace(verdicts=first_verdicts(nodes[index], fix) + state.verdicts)
 
     def predict(self, state: InteractingState, u: Input, duration: float) -> InteractingState:
         """State after `duration` [s]."""
         modes = zip(state.beliefs, self._processes, strict=True)
-        return state._replace(beliefs=tuple(ekf.predict(belief, process, u, duration) for belief, process in modes))
+        beliefs = tuple(ekf.predict(belief, process, u, duration) for belief, process in modes)
+        return state._replace(beliefs=beliefs, verdicts=())
 
     def correct(
         self, state: InteractingState, node_time: float, measurements: Sequence[Measurement]
@@ -103,8 +115,9 @@ class InteractingFilter:
         """State after the compass samples and fixes of a node."""
         for measurement in measurements:
             if measurement.kind == COMPASS:
-                beliefs = tuple(self.models.fuse_heading(belief, measurement) for belief in state.beliefs)
-                state = state._replace(beliefs=beliefs)
+                beliefs, squares = zip(*(self.models.fuse_heading(b, measurement) for b in state.beliefs), strict=True)
+                verdict = measurement, "", squares[int(state.weights.argmax())]
+                state = state._replace(beliefs=beliefs, verdicts=(*state.verdicts, verdict))
             elif measurement.kind == USBL:
                 state = self._fuse_fix(state, measurement)
         return state
@@ -123,26 +136,32 @@ class InteractingFilter:
         is_wrong = bool(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5)
         # A fix that the filter would take, but only just, may as well confirm one that it did not take.
         if is_wrong or (state.rejected and innovation.nis > chi_square(recovery.PROBABLE, 2)):
-            now = self._rejected(state, fix, modes)
+            now = self._rejected(state, fix, modes, innovation.nis)
             agreeing = recovery.agreeing(now, state.rejected, self.noise)
             needed = 1 if state.accepted < TRUSTED else 2
             if len(agreeing) >= needed or (is_wrong and len(state.rejected) >= recovery.REMEMBERED):
                 earlier = agreeing[0] if agreeing else state.rejected[-1]
                 recovered = recovery.recover(state.belief, earlier, now, self.noise)
                 beliefs = (recovered,) * len(modes)
-                return InteractingState(beliefs, self._initial, fix.stamp, 2, count - len(agreeing), (), innovation)
+                taken = [rejected.taken for rejected in agreeing or (earlier,)]
+                verdicts = (*state.verdicts, (fix, "", innovation.nis), *taken)
+                count -= len(agreeing)
+                return InteractingState(beliefs, self._initial, fix.stamp, 2, count, (), innovation, verdicts)
             rejected = (*state.rejected, now) if is_wrong else ()
             count += is_wrong
         accepted = state.accepted + (not rejected)
         transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
         beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)
-        return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation)
+        verdicts = (*state.verdicts, (fix, OUTLIER if is_wrong else "", innovation.nis))
+        return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts)
 
-    def _rejected(self, state: InteractingState, fix: Measurement, modes: Sequence[MixtureUpdate]) -> Rejected:
+    def _rejected(
+        self, state: InteractingState, fix: Measurement, modes: Sequence[MixtureUpdate], nis: float
+    ) -> Rejected:
         """The fix as seen by the modes together, before it was used."""
         residual = np.sum([w * m.innovation.residual for w, m in zip(state.weights, modes, strict=True)], axis=0)
         H = self.models.position.jacobian(state.belief.mean)
-        return Rejected(fix.stamp, residual, H, fix.covariance)
+        return Rejected(fix, residual, H, nis)
 
 
 def _generator(rates: Array, modes: int) -> Array:

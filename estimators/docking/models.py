@@ -11,10 +11,11 @@ from estimators.core import ekf
 from estimators.core.errors import ParameterError
 from estimators.core.history import Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, Verdicts
 from estimators.planar.model import BIASES, MAX_SUBSTEP, Biases, Integrator, PlanarParameters, PlanarProcess
 
 COMPASS, USBL = "compass", "usbl"  # kinds of measurement
+OUTLIER = "outlier"  # why a filter refuses a fix
 
 
 @dataclass(frozen=True, slots=True)
@@ -222,8 +223,8 @@ class PlanarModels:
         """The same vehicle with other densities of the process noise."""
         return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
 
-    def fuse_heading(self, belief: Gaussian, sample: Measurement) -> Gaussian:
-        """Belief after a compass sample; the sensor is linear, so that this holds for every Kalman filter."""
+    def fuse_heading(self, belief: Gaussian, sample: Measurement) -> tuple[Gaussian, float]:
+        """Belief after a compass sample, and its NIS; the sensor is linear: this holds for every Kalman filter."""
         return ekf.correct_angle(belief, self.heading.jacobian(belief.mean), sample.value, sample.covariance)
 
     def first(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, Measurement] | None:
@@ -256,6 +257,11 @@ class PlanarModels:
         onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
         J = onto @ J
         return Gaussian(mean=mean, covariance=J @ covariance @ J.T), fix
+
+
+def first_verdicts(node: Node, fix: Measurement) -> Verdicts:
+    """Verdicts at the node of a first fix, on that and on the compass; not on further fixes."""
+    return tuple((m, "", math.nan) for m in node.measurements if m is fix or m.kind != USBL)
 
 
 def _heading_at(nodes: Sequence[Node], index: int) -> float | None:

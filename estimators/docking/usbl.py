@@ -75,6 +75,14 @@ class UsblModel:
         )
 
 
+def raw_fix(fix: UsblFix) -> Measurement:
+    """A packet as the dock measured it, in no world and without covariance: to say that it was refused."""
+    value, covariance = np.array(fix.position, dtype=float), np.full((3, 3), math.nan)
+    return Measurement(
+        kind=USBL, value=value, covariance=covariance, stamp=fix.stamp, received=fix.received, sequence=fix.sequence
+    )
+
+
 def horizontal_rotation(heading: float, pitch: float, roll: float) -> Array:
     """First two rows (2, 3) of the ZYX rotation from the dock's frame to north, east, down; the paper's eq. 7."""
     cy, sy, cp, sp, cr, sr = (f(a) for a in (heading, pitch, roll) for f in (math.cos, math.sin))

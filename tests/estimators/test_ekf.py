@@ -122,8 +122,9 @@ def test_an_angle_at_once_is_the_angle_by_the_long_way(heading):
     before = belief(10)
     for value in (-3.1, 0.0, 3.1):
         sample = measurement(value, 0.1, "compass")
-        after = correct_angle(before, heading.jacobian(before.mean), sample.value, sample.covariance)
-        expected, _ = correct(before, sample, heading)
+        after, nis = correct_angle(before, heading.jacobian(before.mean), sample.value, sample.covariance)
+        expected, innovation = correct(before, sample, heading)
+        assert nis == innovation.nis
         assert (after.mean == expected.mean).all()
         assert (after.covariance == expected.covariance).all()
 
