@@ -5,9 +5,13 @@ After velocities are known MuJoCo calls `mjcb_passive`. For every body with a co
 the joint-space inertia `mjData.M`, which it then factorises again. All that follows in the step (contact, implicit
 integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in free motion and in contact.
 
-With v_r the hull's velocity relative to the water, omega its angular velocity and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is
-`-M_A J qacc` (in M) plus `M_A [a_c + omega x v_r - (d(J)/dt qvel); 0]`. The water's own pressure adds `rho V a_c` at
-the centre of buoyancy (Auton, Hunt & Prud'homme 1988).
+With v_r the hull's velocity relative to the water, omega its angular velocity, G the gradient of the water's velocity
+and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is `-M_A J qacc` (in M) plus
+`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull meets other water as it moves. A gradient also takes
+`G' p` from the force, p being the linear part of the impulse `M_A nu_r` (Galper & Miloh 1995, J. Fluid Mech. 295), and
+the water's own pressure adds `rho V a_c` at the centre of buoyancy. Force and moment are then those of the kinetic
+energy `nu_r' M_A nu_r / 2`, exact in irrotational strain but for moments of the order of M_A G^2. In rotational shear
+they are an approximation, which has the lift coefficient of a sphere, 1/2 (Auton, Hunt & Prud'homme 1988).
 
 The water is a local expansion in `mjData.userdata`, one slot of `WATER` numbers a vehicle:
 `[time, place (3), velocity (3), dv/dt (3), dv_i/dx_j (9)]` in MuJoCo's world axes. A reset zeroes it.
@@ -114,9 +118,13 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
         p0 += q * (cdof[d + 3] + cdof[d + 1] * a2 - cdof[d + 2] * a1)
         p1 += q * (cdof[d + 4] + cdof[d + 2] * a0 - cdof[d] * a2)
         p2 += q * (cdof[d + 5] + cdof[d] * a1 - cdof[d + 1] * a0)
-    k0 = b0 + o1 * u2 - o2 * u1 - (o1 * p2 - o2 * p1)
-    k1 = b1 + o2 * u0 - o0 * u2 - (o2 * p0 - o0 * p2)
-    k2 = b2 + o0 * u1 - o1 * u0 - (o0 * p1 - o1 * p0)
+    # Change of the water's velocity along the hull's way, dv/dt + (x_dot . grad) v = Dv/Dt + (v_r . grad) v.
+    h0 = b0 + (water[g] * u0 + water[g + 1] * u1 + water[g + 2] * u2)
+    h1 = b1 + (water[g + 3] * u0 + water[g + 4] * u1 + water[g + 5] * u2)
+    h2 = b2 + (water[g + 6] * u0 + water[g + 7] * u1 + water[g + 8] * u2)
+    k0 = h0 + o1 * u2 - o2 * u1 - (o1 * p2 - o2 * p1)
+    k1 = h1 + o2 * u0 - o0 * u2 - (o2 * p0 - o0 * p2)
+    k2 = h2 + o0 * u1 - o1 * u0 - (o0 * p1 - o1 * p0)
     n0 = r00 * k0 + r10 * k1 + r20 * k2
     n1 = r01 * k0 + r11 * k1 + r21 * k2
     n2 = r02 * k0 + r12 * k1 + r22 * k2
@@ -127,11 +135,22 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
     m1 += added_momentum(c, o, 4, n0, n1, n2, 0.0, 0.0, 0.0)
     m2 += added_momentum(c, o, 5, n0, n1, n2, 0.0, 0.0, 0.0)
 
+    # The impulse in strained water, of which G' p is taken from the force.
+    i0 = added_momentum(c, o, 0, v0, v1, v2, w0, w1, w2)
+    i1 = added_momentum(c, o, 1, v0, v1, v2, w0, w1, w2)
+    i2 = added_momentum(c, o, 2, v0, v1, v2, w0, w1, w2)
+    P0 = r00 * i0 + r01 * i1 + r02 * i2
+    P1 = r10 * i0 + r11 * i1 + r12 * i2
+    P2 = r20 * i0 + r21 * i1 + r22 * i2
+
     # To world axes; buoyancy and the water's own pressure gradient act at the hull's origin.
     mass = c[o + DENSITY] * c[o + _VOLUME]
     F0 = r00 * f0 + r01 * f1 + r02 * f2 + mass * (b0 - gravity[0])
     F1 = r10 * f0 + r11 * f1 + r12 * f2 + mass * (b1 - gravity[1])
     F2 = r20 * f0 + r21 * f1 + r22 * f2 + mass * (b2 - gravity[2])
+    F0 -= water[g] * P0 + water[g + 3] * P1 + water[g + 6] * P2
+    F1 -= water[g + 1] * P0 + water[g + 4] * P1 + water[g + 7] * P2
+    F2 -= water[g + 2] * P0 + water[g + 5] * P1 + water[g + 8] * P2
     T0 = r00 * m0 + r01 * m1 + r02 * m2 + a1 * F2 - a2 * F1
     T1 = r10 * m0 + r11 * m1 + r12 * m2 + a2 * F0 - a0 * F2
     T2 = r20 * m0 + r21 * m1 + r22 * m2 + a0 * F1 - a1 * F0
