@@ -152,8 +152,8 @@ class Simulation:
 
     @property
     def time(self) -> float:
-        """Simulated time [s]."""
-        return self.world.time
+        """Simulated time of the last truths [s]."""
+        return next(iter(self.truths.values())).time
 
     @property
     def over(self) -> bool:

@@ -22,7 +22,7 @@ from auvsim.data.log import VehicleLog
 from auvsim.data.variables import Variable
 from auvsim.missions.docking.metrics import docking_metrics
 from auvsim.missions.line_of_sight import course_to_line, cross_track, heading_for_course
-from auvsim.missions.mission import Event, Mission, MissionSetup, Place, Situation
+from auvsim.missions.mission import Event, Metric, Mission, MissionSetup, Place, Situation
 from auvsim.navigation.estimate import Estimate
 
 CLEAR = 4.0  # distance that the go-around keeps from the entrance [m]
@@ -107,6 +107,20 @@ class Docking(Mission):
         "attempt": Variable((), "int8", "1", "number of the docking attempt, from 1"),
         "along_track": Variable((), "float64", "m", "estimated distance along the dock axis, < 0 before", "dock"),
         "cross_track": Variable((), "float64", "m", "estimated distance to starboard of the dock axis", "dock"),
+    }
+    columns: ClassVar = {
+        "docked": Metric("bool", "1", "whether it docked"),
+        "docked_first": Metric("bool", "1", "whether it docked on the first attempt"),
+        "failure_reason": Metric("str", "", "timeout, aborted or diverged; none if docked"),
+        "failure_text": Metric("str", "", "what the log says of it"),
+        "attempts": Metric("int", "1", "attempts to dock"),
+        "time": Metric("float", "s", "of docking, or of the end"),
+        "miss_distance": Metric("float", "m", "of the nose from the dock's axis where it first enters, last attempt"),
+        "cross_track": Metric("float", "m", "its part to starboard"),
+        "vertical": Metric("float", "m", "its part downward"),
+        "heading_error_deg": Metric("float", "deg", "heading less that of the dock, there"),
+        "contact_impulse": Metric("float", "N s", "contact impulse, friction included, until the latch held"),
+        "peak_contact_force": Metric("float", "N", "largest contact force, friction included, until then"),
     }
     aftermath = 5.0
 
