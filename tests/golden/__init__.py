@@ -1,0 +1,11 @@
+"""Golden logs: five short trials, kept so that a change of structure can be seen to change no number.
+
+On one machine every array must stay equal bit for bit:
+
+    python -m tests.golden.compare record BEFORE    # with the code before
+    python -m tests.golden.compare record AFTER     # with the code after
+    python -m tests.golden.compare BEFORE AFTER     # lists what differs, through the table of `names`
+
+Elsewhere `test_golden` compares a part of each log, kept in `logs/`, within tolerances; `statistics.json` keeps 200
+trials of the default plan. `format1/` and `format2/` hold whole logs as those versions of the format wrote them.
+"""
