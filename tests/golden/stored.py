@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from .cases import CASES, HERE, run
 from .compare import Contents, load, old_form
@@ -42,7 +41,7 @@ KEPT = {
 VARIANCES = "estimate/variances"  # the diagonal of each fourth covariance
 
 
-def part(contents: Contents) -> dict[str, NDArray[Any]]:
+def part(contents: Contents) -> dict[str, Any]:
     """What is kept of a log, under the names of format 2."""
     whole = old_form(contents)
     kept = {path: whole[path][::step] for path, step in KEPT.items()}
@@ -50,7 +49,7 @@ def part(contents: Contents) -> dict[str, NDArray[Any]]:
     return kept | {VARIANCES: np.diagonal(whole["estimate/covariance"][::4], axis1=1, axis2=2)}
 
 
-def read(name: str) -> dict[str, NDArray[Any]]:
+def read(name: str) -> dict[str, Any]:
     """What is kept of a case."""
     with np.load(HERE / "logs" / f"{name}.npz") as file:
         return dict(file)

@@ -88,7 +88,7 @@ def old() -> compare.Contents:
 
 def test_one_bit_is_seen(old: compare.Contents):
     """In a number, in a count, in a text; also the sign of a zero. What the wall clock says is not."""
-    assert compare.differences(old, old | {"@wall_time": np.float64(1.0), "@numpy_version": np.asarray("0")}) == []
+    assert compare.differences(old, old | {"@wall_time": np.asarray(1.0), "@numpy_version": np.asarray("0")}) == []
     for path in ("truth/position", "estimate/covariance", "usbl/sequence"):
         other = old[path].copy()
         other.view(np.uint8).flat[-other.itemsize] ^= 1
@@ -99,7 +99,7 @@ def test_one_bit_is_seen(old: compare.Contents):
     assert len(compare.differences(old, old | {"event/kind": text})) == 1
     zeros = {path: np.zeros(3) for path in ("a", "b")}
     assert len(compare.differences(old | zeros, old | zeros | {"b": -zeros["b"]})) == 1
-    assert len(compare.differences(old, old | {"@seed": old["@seed"] + 1})) == 1
+    assert len(compare.differences(old, old | {"@seed": np.asarray(99)})) == 1
     assert len(compare.differences(old, old | {"depth/value": old["depth/value"].astype(np.float32)})) == 1
 
 
@@ -126,7 +126,7 @@ def test_moved_names_are_followed(old: compare.Contents, monkeypatch: pytest.Mon
     fins = new.pop("vehicles/a/truth/fins")
     new |= {f"vehicles/a/fin/{i}": fins[:, i] for i in range(4)}
     new |= {"structures/dock@depth": old["@dock_depth"], "network/messages": np.zeros(2)}
-    new |= {compare.VERSION: np.int64(3), "@scenario": np.asarray("vehicles: {}")}
+    new |= {compare.VERSION: np.asarray(3), "@scenario": np.asarray("vehicles: {}")}
     assert compare.differences(old, new) == []
     swapped = new | {"vehicles/a/fin/0": fins[:, 1], "vehicles/a/fin/1": fins[:, 0]}
     assert [line.split(":")[0] for line in compare.differences(old, swapped)] == ["truth/fins"]
