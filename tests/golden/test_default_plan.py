@@ -38,7 +38,7 @@ def test_kept_statistics_are_those_of_the_kept_trials():
 def test_statistics_of_three_trials():
     """By hand: one docks at once, one at its second attempt, one never and without a miss."""
     names = ("docked", "attempts", "time", "cross_track", "vertical", "nees_per_dof", "position_rms")
-    values = [(True, 1, 100.0, 0.3, 0.6, 0.5, 1.0), (True, 2, 200.0, -0.4, 0.8, 1.0, 2.0)]
+    values: list[tuple] = [(True, 1, 100.0, 0.3, 0.6, 0.5, 1.0), (True, 2, 200.0, -0.4, 0.8, 1.0, 2.0)]
     values.append((False, 3, 600.0, None, None, None, 6.0))
     rows = [dict.fromkeys(default_plan.COLUMNS) | dict(zip(names, row, strict=True)) for row in values]
     found = default_plan.statistics(rows)
