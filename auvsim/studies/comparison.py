@@ -10,8 +10,9 @@ from typing import Any, Literal
 from rich.console import RenderableType
 from rich.table import Table
 
+from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.missions.docking.metrics import Summary, wilson
+from auvsim.missions.docking.metrics import Summary
 from auvsim.navigation.navigator import FACTORIES
 from auvsim.studies.trials import docking_trial
 

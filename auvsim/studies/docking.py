@@ -9,8 +9,9 @@ from statistics import median
 from rich.console import RenderableType
 from rich.table import Table
 
+from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.missions.docking.metrics import Summary, wilson
+from auvsim.missions.docking.metrics import Summary
 from auvsim.studies.trials import docking_trial
 
 LATER = 3  # attempts that the default guidance has

@@ -10,6 +10,7 @@ import numpy as np
 from rich.console import RenderableType
 from rich.table import Table
 
+from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, Fit, with_values
@@ -18,7 +19,6 @@ from auvsim.identification.prediction_error import PredictionErrorOptions, fit_p
 from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
 from auvsim.identification.states import first_belief
-from auvsim.missions.docking.metrics import wilson
 from auvsim.physics.planar_fit import fit_planar_model
 from estimators.core.consistency import nees
 from estimators.core.types import Array

@@ -18,6 +18,7 @@ from rich.console import RenderableType
 from rich.markup import escape
 from rich.table import Table
 
+from auvsim.analysis.statistics import bootstrap_rms_ratio
 from auvsim.base.randomness import stream
 from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification.fit import DEFAULT_FREE, with_values
@@ -139,19 +140,12 @@ def rms(rows: np.ndarray) -> float:
     return math.sqrt(total / count) if count else math.nan
 
 
-def ratio(
-    ours: Sequence[Summary],
-    theirs: Sequence[Summary],
-    quantity: str = "position",
-    phase: str = "all",
-    draws: int = 2000,
-) -> Ratio:
-    """Ratio of rms errors, with a percentile interval by resampling pairs of trials (Efron 1979)."""
+def ratio(ours: Sequence[Summary], theirs: Sequence[Summary], quantity: str = "position", phase: str = "all") -> Ratio:
+    """Ratio of rms errors over the trials in which both have estimates, with its bootstrap interval."""
     a, b = squares(ours, quantity, phase), squares(theirs, quantity, phase)
-    generator = np.random.default_rng(0)
-    picks = generator.integers(0, len(a), (draws, len(a)))
-    drawn = [rms(a[pick]) / rms(b[pick]) for pick in picks]
-    low, high = np.percentile(drawn, (2.5, 97.5)).tolist()
+    both = (a[:, 0] > 0) & (b[:, 0] > 0)
+    a, b = a[both], b[both]
+    low, high = bootstrap_rms_ratio(a, b)
     return Ratio(value=rms(a) / rms(b), low=low, high=high)
 
 

@@ -4,13 +4,11 @@ import dataclasses
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from statistics import NormalDist
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, wrap
 from auvsim.data.log import PHASES, WALL_TIME, TrialLog
 from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position, to_body
@@ -206,25 +204,6 @@ def fixes(log: TrialLog) -> Array:
     packets = log["usbl"]["value"]
     places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) for packet in packets]
     return np.array(places, dtype=float).reshape(len(packets), 2)
-
-
-def wilson(successes: int, trials: int, confidence: float = 0.95) -> tuple[float, float]:
-    """Wilson's score interval of a success rate (Wilson 1927; Newcombe 1998, method 3); (0, 1) without trials.
-
-    Raises:
-        InputError: if the counts or the confidence are out of range.
-    """
-    if not (0 <= successes <= trials and 0.0 < confidence < 1.0):
-        raise InputError(
-            f"{successes} successes of {trials} at {confidence}: needs 0 <= successes <= trials, 0 < p < 1"
-        )
-    if trials == 0:
-        return 0.0, 1.0
-    z = NormalDist().inv_cdf(0.5 + confidence / 2.0)
-    rate, weight = successes / trials, z * z / trials
-    centre = (rate + weight / 2.0) / (1.0 + weight)
-    half = math.sqrt(rate * (1.0 - rate) * weight + weight * weight / 4.0) / (1.0 + weight)
-    return max(centre - half, 0.0), min(centre + half, 1.0)
 
 
 def phase_at(log: TrialLog, times: Array) -> NDArray[np.int64]:
