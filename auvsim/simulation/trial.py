@@ -30,7 +30,7 @@ from auvsim.sensors.feedback import Feedback
 from auvsim.sensors.gyro import Gyro
 from auvsim.simulation import scenario
 from auvsim.vehicles import library
-from auvsim.water.currents import build_current
+from auvsim.water.currents import build_current, listeners
 
 APPROACHING = (Phase.APPROACH, Phase.FINAL)
 AFTERMATH = 5.0  # how long a trial runs on after its verdict, so that the end can be seen [s]
@@ -92,7 +92,7 @@ class Loop:
             return stream(seed, trial, f"{name}/{sensor}")
 
         self.current = build_current(plan.current, noise("current"), plan.duration + 1.0)
-        self._approach_matters = not self.current.steady_uniform
+        self._listeners = listeners(self.current)
         data = mujoco.MjData(scene.model)
         self.world = World(scene.model, data, vehicle, pose, self.current, plan.world.water_density)
         estimator, density = plan.estimator, plan.world.water_density
@@ -193,8 +193,9 @@ class Loop:
         if heading is None or depth is None:  # nothing measured yet: go on as started
             return
         wanted = guidance.update(time, self._estimate, heading, depth, self.world.latched)
-        if self._approach_matters and guidance.phase in APPROACHING:
-            self.current.approach(guidance.attempt, float(np.hypot(*self._truth.position[:2])), time)
+        if self._listeners and guidance.phase in APPROACHING:
+            for listener in self._listeners:
+                listener.approach(guidance.attempt, float(np.hypot(*self._truth.position[:2])), time)
         self._commands = autopilot.command(*wanted, guidance.rudder)
         self.world.command(*self._commands)
         self.log.append("guidance", (time, guidance.phase, guidance.attempt, *wanted, guidance.along, guidance.cross))
