@@ -48,6 +48,8 @@ def check(log: "Log", where: str) -> None:
     for path, table in ROOT_TABLES.items():
         _check_holds(log, path, table, where)
     for path in log.groups:
+        if path.startswith("vehicles/") and path.split("/")[1] not in log.vehicles:
+            raise InputError(f"{where}: the group '{path}' is of no vehicle; there are {', '.join(log.vehicles)}")
         _check_group(log.groups[path], log.tables.get(path, {}), where, path)
     for name in {*log.groups["event"]["vehicle"].tolist()} - {"", *log.vehicles}:
         known = ", ".join(log.vehicles)

@@ -64,7 +64,8 @@ class Log:
         return StructureLog(self, name)
 
     def _instances(self, kind: str) -> tuple[str, ...]:
-        return tuple(path.split("/")[1] for path in self.group_attributes if path.startswith(f"{kind}/"))
+        paths = (path.split("/") for path in self.group_attributes)
+        return tuple(path[1] for path in paths if len(path) == 2 and path[0] == kind)
 
 
 @dataclass(frozen=True, slots=True)

@@ -127,7 +127,7 @@ CONTACT: Table = {
     **TIME,
     "force": Variable((), "float64", "N", "magnitude of the contact force, friction included"),
     "impulse": Variable((), "float64", "N s", "integral of that magnitude over time so far"),
-    "other": Variable((), "category", "", "what the vehicle touches"),
+    "other": Variable((), "category", "", "what the vehicle touches; empty if unknown"),
 }
 
 READING: Table = {  # columns of every sensor; `value` and the sensor's own join them
