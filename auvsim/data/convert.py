@@ -88,9 +88,7 @@ class _Old:
             "measurements": empty(Group(MEASUREMENTS)),
             "mission": self._mission(manoeuvre),
             "command": dict(self._fields("command")),
-            "contact": self._described(
-                CONTACT, self._values("contact") | {"other": self._repeated("contact", "")}
-            ),
+            "contact": self._described(CONTACT, self._values("contact") | {"other": self._repeated("contact", "")}),
             **{f"sensors/{name}": self._sensor(name) for name in SENSORS if name in self.found.groups},
         }
         event = self._described(EVENT, self._values("event") | {"vehicle": self._repeated("event", self.vehicle)})

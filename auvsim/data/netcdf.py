@@ -22,7 +22,7 @@ from auvsim.base.files import whole
 
 Attribute = str | int | float
 # Any file that HDF5 cannot make sense of ends in one of these, by where the damage is.
-UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError, AttributeError)
+UNREADABLE = (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError)
 CHUNK = 1024  # rows of a chunk of a file that grows
 # Attributes by which HDF5 and NetCDF keep their books, and the mark of types that NetCDF does not have.
 _BOOKS = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
