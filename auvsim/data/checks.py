@@ -7,21 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
-from auvsim.data.variables import (
-    DTYPES,
+from auvsim.data.attributes import (
     FORMAT_VERSION,
-    READING,
-    ROOT_TABLES,
     RUN_ATTRIBUTES,
-    SIZES,
     STATUSES,
     STRUCTURE_ATTRIBUTES,
     VEHICLE_ATTRIBUTES,
-    VEHICLE_TABLES,
     AttributeSpec,
-    Table,
-    Variable,
 )
+from auvsim.data.variables import DTYPES, READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table, Variable
 
 if TYPE_CHECKING:
     from auvsim.data.log import Log

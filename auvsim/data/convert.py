@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 
 from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
+from auvsim.data.attributes import FORMAT_VERSION
 from auvsim.data.fields import empty, field_of
 from auvsim.data.netcdf import Content, Field
 from auvsim.data.variables import (
     CONTACT,
     ESTIMATE,
     EVENT,
-    FORMAT_VERSION,
     MEASUREMENTS,
     MESSAGES,
     MISSION,

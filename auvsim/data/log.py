@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
 from auvsim.data import convert, netcdf
+from auvsim.data.attributes import VERSIONS, WALL_TIME
 from auvsim.data.checks import check
 from auvsim.data.description import table_markdown
 from auvsim.data.fields import content, parts
-from auvsim.data.variables import VERSIONS, WALL_TIME, Variable
+from auvsim.data.variables import Variable
 
 Columns = dict[str, NDArray[Any]]
 Attributes = dict[str, str | int | float]
