@@ -128,6 +128,15 @@ def test_the_phase_of_a_manoeuvre_is_the_only_one_of_its_mission(manoeuvre: Path
     assert len(vehicle["dvl"]["time"]) > 50 < len(vehicle["gyro"]["time"])
 
 
+def test_a_manoeuvre_is_known_by_its_phase_or_by_its_scenario(manoeuvre: Path):
+    assert renamed(manoeuvre, "manoeuvre:", "something:").vehicle().mission == "manoeuvre"
+    with h5py.File(manoeuvre, "a") as content:
+        for dataset in content["guidance"].values():
+            dataset.resize(0, axis=0)
+    assert read(manoeuvre).vehicle().mission == "docking"  # neither is left
+    assert renamed(manoeuvre, "something:", "manoeuvre:").vehicle().mission == "manoeuvre"
+
+
 def test_format_1_knew_neither_dvl_nor_gyro(docking: Path):
     newer = read(docking)
     with h5py.File(docking, "a") as content:

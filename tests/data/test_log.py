@@ -11,7 +11,7 @@ from log_samples import PHASES, STATES, record, recorder, sample_log
 from auvsim.base.errors import InputError
 from auvsim.data.attributes import RUN_ATTRIBUTES, STRUCTURE_ATTRIBUTES, VEHICLE_ATTRIBUTES
 from auvsim.data.log import Log, differences, pack, read, table_markdown, write
-from auvsim.data.variables import ROOT_TABLES, VEHICLE_TABLES, Variable
+from auvsim.data.variables import ROOT_TABLES, VEHICLE_TABLES, Variable, vehicle_groups
 
 OWN = "vehicles/remus100"
 
@@ -99,6 +99,7 @@ def test_other_netcdf_readers_find_names_units_and_dimensions(log: Log, file: Pa
         assert np.array_equal(np.asarray(phase.attrs["flag_values"]), range(len(PHASES)))
         assert other[f"{OWN}/estimate/mean"].attrs["labels"] == ",".join(STATES)
         assert other[f"{OWN}/truth"].dimensions["time"].isunlimited()
+        assert other[f"{OWN}/sensors/usbl/lost"].dtype == np.int8  # NetCDF has no booleans
         assert other.attrs["status"] == "complete"
         assert other[OWN].attrs["nose"] == 0.8
         assert other["structures/dock"].attrs["throat_length"] == 0.7
@@ -185,6 +186,24 @@ def test_one_vehicle_among_several():
     assert (first.mission, second.mission, second.structure) == ("docking", "track", None)
 
 
+def test_groups_follow_the_parts_of_a_vehicle():
+    found = vehicle_groups(
+        sensors={"range_1": ({"value": Variable(("range",), "float64", "m", "range")}, {"range": 1})},
+        mission=(("leg", "turn"), {}),
+        demands={},
+        channels={"thruster_1": "rad/s", "thruster_2": "rad/s"},
+        states={"north": "m", "east": "m", "heading": "rad"},
+    )
+    estimate, truth = found["estimate"], found["truth"]
+    assert (estimate.shape(4, "mean"), estimate.shape(4, "covariance")) == ((4, 3), (4, 3, 3))
+    assert estimate.table["mean"].labels == estimate.table["covariance"].labels == ("north", "east", "heading")
+    assert (estimate.table["mean"].units, truth.table["actuators"].units) == ("m, m, rad", "rad/s, rad/s")
+    assert truth.shape(4, "actuators") == (4, 2)
+    assert found["mission"].table["phase"].flags == ("leg", "turn")
+    assert list(found["sensors/range_1"].table) == ["time", "received", "value", "sequence"]
+    assert found["sensors/range_1"].shape(4, "value") == (4, 1)
+
+
 # Files that are no logs
 
 
@@ -251,7 +270,7 @@ def test_netcdf_that_is_no_log(file: Path):
 
 def test_codes_without_category_are_refused(file: Path):
     with h5py.File(file, "a") as content:
-        content[f"{OWN}/measurements/reason"][3] = 7
+        content[f"{OWN}/measurements/reason"][3] = 2  # there are 0 and 1
     with pytest.raises(InputError, match=r"'/vehicles/remus100/measurements/reason' has a code without category"):
         read(file)
 
@@ -366,6 +385,8 @@ def test_differences_see_one_bit_and_ignore_clocks_and_versions(log: Log):
     nu = log.groups[f"{OWN}/truth"]["nu"].copy()
     nu[7, 2] = np.nextafter(nu[7, 2], np.inf)
     assert differences(log, changed(log, f"{OWN}/truth/nu", nu)) == [f"{OWN}/truth/nu"]
+    initial, later = changed(log, f"{OWN}/truth/time", np.zeros(2)), changed(log, f"{OWN}/truth/time", np.zeros(2, int))
+    assert differences(initial, later) == [f"{OWN}/truth/time"]  # the same bytes, other types
     text = np.array(["else"], dtype=object)
     assert differences(log, changed(log, "event/text", text)) == ["event/text"]
     later = {**log.attributes, "wall_time": 99.0, "mujoco_version": "0"}
