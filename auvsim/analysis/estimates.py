@@ -125,5 +125,3 @@ def _rms(errors: Array) -> float | None:
     """Root of the mean squared length of error vectors (n, k); those that are not finite do not count."""
     squares = np.square(errors[np.isfinite(errors).all(axis=1)]).sum(axis=1)
     return float(np.sqrt(squares.mean())) if len(squares) else None
-
-
