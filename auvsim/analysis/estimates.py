@@ -105,8 +105,9 @@ def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
     if "usbl" not in log:
         return np.empty((0, 2))
-    origin = usbl_dock(log).position[:2]
-    transceiver = [log.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down")]
+    dock = usbl_dock(log)
+    origin = dock.position[:2]
+    transceiver = [dock.number(f"transceiver_{axis}", 0.0) for axis in ("forward", "starboard", "down")]
     packets = log["usbl"]["value"]
     places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) + origin for packet in packets]
     return np.array(places, dtype=float).reshape(len(packets), 2)

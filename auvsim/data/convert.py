@@ -153,7 +153,7 @@ class _Old:
         if manoeuvre:
             fields["phase"] = replace(fields["phase"], values=fields["phase"].values - np.int8(MANOEUVRE))
         table = {**MISSION, "phase": replace(MISSION["phase"], flags=phases)}
-        own = {name: item for name, item in fields.items() if name not in table}
+        own = {} if manoeuvre else {name: item for name, item in fields.items() if name not in table}
         return self._described(table, {name: item.values for name, item in fields.items()}) | own
 
     def _sensor(self, name: str) -> dict[str, Field]:
