@@ -55,7 +55,8 @@ class Craft:
         self._controls = [int(actuator.id) for actuator in actuators]
         self._angles, self._rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
         # A velocity servo has no stiffness: its channel is a rate, any other's an angle.
-        self._turning = np.flatnonzero([actuator.biasprm[1] == 0.0 for actuator in actuators])
+        self._turning = [i for i, actuator in enumerate(actuators) if actuator.biasprm[1] == 0.0]
+        self._turning_rates = [(i, int(self._rates[i])) for i in self._turning]
         self._rotation = np.zeros(9)
         self._matrix = self._rotation.reshape(3, 3)
 
@@ -107,7 +108,8 @@ class Craft:
         over_ground = nu[:3]
         over_ground[:] = over_ground.dot(self._matrix)
         actuators = self._qpos.take(self._angles)
-        actuators[self._turning] = self._qvel.take(self._rates[self._turning])
+        for channel, rate in self._turning_rates:
+            actuators[channel] = self._qvel[rate]
         return Truth(
             time=time,
             position=position,
