@@ -197,6 +197,27 @@ def test_each_latch_holds_its_own_vehicle_at_its_own_place():
         assert {contact.other for contact in world.contacts(vehicle)} <= {"east" if pose is EAST else "west"}
 
 
+def test_two_that_dock_at_once_move_as_if_alone():
+    """Contact and latch of one do not reach the other: equal but for the rounding of one solver for both."""
+
+    def dock(*names):
+        world = build(names, {"west": WEST, "east": EAST})
+        starts = {"auv_1": (EAST, -3.0, 0.1), "auv_2": (WEST, -3.5, -0.4)}
+        for name in names:
+            pose, along, across = starts[name]
+            world.place(name, ahead_of(pose, along, across), pose.heading, 1.0, [0.0, 0.0, 0.0, 0.0, 62.0])
+        world.advance(1200)
+        return world
+
+    together = dock("auv_1", "auv_2")
+    for name in together.vehicles:
+        alone = dock(name)
+        assert together.latched(name) == alone.latched(name) is not None
+        assert len(together.contacts(name)) == len(alone.contacts(name)) > 0
+        for found, expected in zip(together.truth(name), alone.truth(name), strict=True):
+            assert found == pytest.approx(expected, abs=1e-11)  # measured 1e-14
+
+
 def test_an_occupied_structure_captures_no_other():
     world = build(["auv_1", "auv_2"], {"west": WEST})
     park(world, "auv_2")
@@ -217,6 +238,7 @@ def test_even_a_nose_in_the_throat_is_left_alone_by_an_occupied_structure():
     world.place("auv_2", ahead_of(WEST, DOCK.latched - 0.8), WEST.heading, 0.0, [0.0] * 5)
     world.advance(1)
     assert world.latched("auv_2") is None
+    assert world.data.eq_active.sum() == 1
     # Taken away and put back without the first, it is captured.
     park(world, "auv_1")
     world.place("auv_2", ahead_of(WEST, DOCK.latched - 0.8), WEST.heading, 0.0, [0.0] * 5)
@@ -232,6 +254,7 @@ def test_a_held_vehicle_is_not_captured_by_another_structure():
     world.advance(3)
     assert world.latched("auv_1") == "west"
     assert world.structures["twin"].latched is None
+    assert world.data.eq_active.sum() == 1
 
 
 def test_divergence_names_the_vehicle():
@@ -249,6 +272,18 @@ def test_many_shafts_at_full_speed_are_no_divergence():
     for i, name in enumerate(names):
         world.place(name, np.array([100.0 * i, 0.0, 20.0]), 0.0, 2.0, [0.0, 0.0, 0.0, 0.0, 158.0])
     world.advance(1)
+
+
+def test_placed_actuators_already_carry_out_their_commands():
+    world = build(["auv_1", "auv_2"], {"west": WEST})
+    park(world, "auv_1")
+    for channels in ([0.1, 0.12, -0.05, -0.03, 60.0], [-0.2, 0.2, 0.0, 0.15, -40.0]):  # again, over what was
+        world.place("auv_2", np.array([20.0, -30.0, 9.0]), -2.0, 1.0, channels)
+        assert np.array_equal(world.truth("auv_2").actuators, channels)
+        assert world.truth("auv_2").nu == pytest.approx([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], abs=1e-15)
+        world.advance(40)
+        assert world.truth("auv_2").actuators == pytest.approx(channels, abs=0.2)
+        assert world.truth("auv_1").actuators == pytest.approx(np.zeros(5), abs=1e-3)  # and the other's do not
 
 
 def test_a_vehicle_without_a_place_is_named():
