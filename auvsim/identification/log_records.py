@@ -91,9 +91,8 @@ def _places(log: TrialLog, heading: Signal, transponder: tuple[float, float, flo
 def _deviations(plan: scenario.Scenario, places: Array) -> dict[str, float]:
     """Of one reading, as the scenario's data sheets say."""
     sensors = plan.sensors
-    distance = max(float(np.median(np.hypot(*places.T))), 1e-3) if len(places) else 1.0
-    ranges, sds = np.log(np.array(sensors.usbl.noise)).T
-    fix = sensors.usbl.noise_scale * math.exp(float(np.interp(math.log(distance), ranges, sds)))
+    distance = float(np.median(np.hypot(*places.T))) if len(places) else 1.0
+    fix = sensors.usbl.sigma(distance)
     given = {
         "north": fix, "east": fix,
         "heading": math.radians(sensors.compass.heading_noise_deg),

@@ -14,7 +14,7 @@ from auvsim.data.log import PHASES, WALL_TIME, TrialLog
 from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position, to_body
 from auvsim.missions.docking.guidance import Phase
 from estimators.core.consistency import chi_square, interval, normalised_square
-from estimators.docking.estimator import horizontal_rotation
+from estimators.docking.usbl import UsblFix, UsblModel
 
 FAILURES = ("timeout", "diverged", "aborted")  # kinds of event that end a trial without docking
 ENTERING = ("approach", "final", "docked")  # phases in which passing the mouth's plane is an entrance
@@ -200,10 +200,10 @@ def estimate_quality(errors: EstimateErrors) -> dict[str, EstimateQuality]:
 
 def fixes(log: TrialLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
-    transceiver = [log.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down")]
-    packets = log["usbl"]["value"]
-    places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) for packet in packets]
-    return np.array(places, dtype=float).reshape(len(packets), 2)
+    forward, starboard, down = (log.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down"))
+    model, packets = UsblModel(transceiver=(forward, starboard, down)), log["usbl"]["value"]
+    found = [UsblFix(stamp=0.0, received=0.0, position=p[:3], heading=p[3], pitch=p[4], roll=p[5]) for p in packets]
+    return np.array([model.world_fix(fix).value for fix in found], dtype=float).reshape(len(packets), 2)
 
 
 def phase_at(log: TrialLog, times: Array) -> NDArray[np.int64]:
