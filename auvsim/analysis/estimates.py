@@ -11,7 +11,7 @@ from auvsim.data.log import StructureLog, VehicleLog
 from auvsim.data.phases import interpolate, phase_at
 from auvsim.missions.docking.dock_frame import to_body
 from estimators.core.consistency import chi_square, interval, normalised_square
-from estimators.docking.usbl import horizontal_rotation
+from estimators.docking.usbl import UsblFix, UsblModel
 
 NEES_INTERVAL = interval(2)  # 95 % of the NEES of a horizontal position
 AT_REST = "docked"  # phase in which the vehicle no longer moves as any model of free motion says
@@ -106,11 +106,11 @@ def fixes(log: VehicleLog) -> Array:
     if "usbl" not in log:
         return np.empty((0, 2))
     dock = usbl_dock(log)
-    origin = dock.position[:2]
-    transceiver = [dock.number(f"transceiver_{axis}", 0.0) for axis in ("forward", "starboard", "down")]
-    packets = log["usbl"]["value"]
-    places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) + origin for packet in packets]
-    return np.array(places, dtype=float).reshape(len(packets), 2)
+    forward, starboard, down = (dock.number(f"transceiver_{a}", 0.0) for a in ("forward", "starboard", "down"))
+    model, packets = UsblModel(transceiver=(forward, starboard, down)), log["usbl"]["value"]
+    found = [UsblFix(stamp=0.0, received=0.0, position=p[:3], heading=p[3], pitch=p[4], roll=p[5]) for p in packets]
+    places = np.array([model.world_fix(fix).value for fix in found], dtype=float).reshape(len(packets), 2)
+    return places + dock.position[:2]
 
 
 def usbl_dock(log: VehicleLog) -> StructureLog:
