@@ -16,6 +16,7 @@ from auvsim.data.log import Log
 from auvsim.data.phases import phase_stretches
 
 ESTIMATE: dict[str, Any] = {"ls": (0, (5, 2)), "lw": 1.0}
+MOST_TOLD = 6  # vehicles whose results stand in the title
 LEAST_NAMED = 0.06  # part of the time that a phase must take for its name to be written into its bar
 
 
@@ -43,8 +44,8 @@ def fleet_figure(log: Log) -> Figure:
     entries |= {"estimate": Line2D([], [], color="black", **ESTIMATE)}
     legend(figure, entries | {name: plan[name] for name in ("start", "end", "dock", "dock axis") if name in plan})
     run = f"Trial {log.attributes['trial']}, seed {log.attributes['seed']}"
-    results = "\n".join(f"{name}: {outcome(log.vehicle(name))}" for name in log.vehicles)
-    figure.suptitle(f"{run}, {len(log.vehicles)} vehicles\n{results}", fontsize=11.5)
+    results = [f"{name}: {outcome(log.vehicle(name))}" for name in log.vehicles[:MOST_TOLD]]
+    figure.suptitle("\n".join([f"{run}, {len(log.vehicles)} vehicles", *results]), fontsize=11.5)
     return figure
 
 

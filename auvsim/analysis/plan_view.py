@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -47,8 +48,10 @@ def draw_docks(axes: Axes, docks: Sequence[StructureLog]) -> None:
         label = {} if index else {"label": "dock"}
         axes.plot(*place, marker=symbol, mfc="#f0d9c4", mec=DOCK, ms=26, ls="", zorder=2, **label)
         if len(docks) > 1:
-            style = {"color": DOCK, "fontsize": 10.5, "fontweight": "bold"}
-            axes.annotate(dock.name, tuple(place), (14, -14), textcoords="offset points", zorder=7, **style)
+            inward = 1.0 if place[0] < (west + east) / 2.0 else -1.0  # so that the name stays inside
+            style: dict[str, Any] = {"color": DOCK, "fontsize": 10.5, "fontweight": "bold", "zorder": 7}
+            style["ha"] = "left" if inward > 0.0 else "right"
+            axes.annotate(dock.name, tuple(place), (14.0 * inward, -14.0), textcoords="offset points", **style)
 
 
 def draw_current(axes: Axes, flow: Array, shown: Array) -> None:

@@ -30,6 +30,7 @@ PHASE_COLOURS = {
     "done": "#9467bd",
 }
 OTHER_PHASES = ("#1f77b4", "#17a2a2", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b")  # of missions of the user's own
+MOST_IN_ROW = 13  # entries of a legend
 NO_PHASE = "#444444"
 VEHICLES = ("#1f77b4", "#d95f02", "#2c8c2c", "#9467bd", "#c2185b", "#7f6a00", "#17a2a2", "#444444")
 DOCK = "#8c4a1f"
@@ -116,7 +117,8 @@ def shade_phases(axes: Axes, log: VehicleLog) -> None:
 
 
 def legend(figure: Figure, entries: dict[str, Any]) -> None:
-    """One row below all axes."""
+    """One row below all axes, or two where there are many entries."""
     handles, labels = list(entries.values()), list(entries)
+    columns = len(labels) if len(labels) <= MOST_IN_ROW else (len(labels) + 1) // 2
     style: dict[str, Any] = {"fontsize": 9.5, "frameon": False, "columnspacing": 1.4}
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels), **style)
+    figure.legend(handles, labels, loc="outside lower center", ncols=columns, **style)
