@@ -17,9 +17,8 @@ from auvsim.simulation import scenario
 from auvsim.simulation.run import run
 
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
-BLOCKS = {  # by the file name in the first line
-    name: text for name, text in re.findall(r"^```\w+\n# (\S+)\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE)
-}
+# The page's files by the name in the first line of each block.
+BLOCKS = dict(re.findall(r"^```\w+\n# (\S+)\n(.*?)^```", PAGE.read_text(), re.DOTALL | re.MULTILINE))
 
 
 @pytest.fixture(scope="module")
@@ -57,9 +56,7 @@ def test_sensor_measures_at_its_rate_and_is_logged_with_its_units(profile: Vehic
     """Its error has the noise that the scenario gives: sd 0.01 within 5 standard errors."""
     readings, truth = profile["temperature"], profile["truth"]
     assert np.allclose(np.diff(readings["time"]), 0.5)
-    error = readings["value"][:, 0] - (
-        18.0 - 0.2 * np.interp(readings["time"], truth["time"], truth["position"][:, 2])
-    )
+    error = readings["value"][:, 0] - (18.0 - 0.2 * np.interp(readings["time"], truth["time"], truth["position"][:, 2]))
     assert abs(error.std() - 0.01) < 5 * 0.01 / np.sqrt(2 * len(error))
     assert abs(error.mean()) < 5 * 0.01 / np.sqrt(len(error))
     assert profile.table("temperature")["value"].units == "degC"
@@ -80,24 +77,27 @@ def test_estimator_reckons_and_its_states_are_logged(profile: VehicleLog) -> Non
 
 
 def test_controller_turns_to_the_heading_and_holds_it(profile: VehicleLog) -> None:
-    """From 60 deg the vehicle turns to 30 deg and stays within 5 deg of it, of which the compass has 1.5 (3 sd)."""
+    """From 60 deg the vehicle turns to 0.5 rad and stays within 5 deg of it, of which the compass has 1.5 (3 sd)."""
     heading = np.degrees([wrap(yaw) for yaw in profile["truth"]["attitude"][:, 2]])
     assert abs(heading[0] - 60.0) < 1.0
     settled = heading[len(heading) // 2 :]
-    assert np.abs(settled - 30.0).max() < 5.0
+    assert np.abs(settled - np.degrees(0.5)).max() < 5.0
     assert profile["command"]["rudder"][0] < 0.0  # to port
 
 
-def test_mission_dives_twice_and_its_metrics_are_in_the_summary(profile: VehicleLog) -> None:
+def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(profile: VehicleLog) -> None:
     """Phases, variables, events and metrics are all read off the log; it ends before the time limit."""
     mission, depth = profile["mission"], profile["truth"]["position"][:, 2]
     assert profile.phases == ("dive", "climb")
-    assert mission["dives"].tolist() == sorted(mission["dives"])
-    assert (profile["event"]["kind"] == "climb").sum() == 2
+    assert mission["phase"][0] == 0
+    reached = profile["event"]["time"][profile["event"]["kind"] == "reached"]
+    for time, wanted in zip(reached, (13.0, 8.0, 12.0, 8.0), strict=True):  # to 0.5 m of the gauge, bias 0.1 m (sd)
+        assert abs(np.interp(time, profile["truth"]["time"], depth) - wanted) < 1.0
+    assert np.array_equal(mission["reached"], np.searchsorted(reached, mission["time"], side="right"))
     assert profile["truth"]["time"][-1] < 240.0
     summary = summarise(profile)
-    assert summary["dives"] == mission["dives"][-1] == 2
-    assert summary["deepest"] == depth.max() > 12.0
+    assert summary["reached"] == 4
+    assert summary["deepest"] == depth.max()
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_mission_dives_twice_and_its_metrics_are_in_the_summary(profile: Vehicle
     [
         ("sensors", "temperature", {"noise": -1.0}),
         ("control", "Helm", {"heading_gian": 1.0}),
-        ("mission", "Profile", {"shallow": 8}),
+        ("mission", "Profile", {"heading": 0.5}),
     ],
 )
 def test_mistakes_in_settings_of_ones_own_are_one_line(folder: Path, key: str, part: str, settings: dict) -> None:
@@ -115,7 +115,7 @@ def test_mistakes_in_settings_of_ones_own_are_one_line(folder: Path, key: str, p
     with pytest.raises(InputError, match=part) as caught:
         run(scenario.parse(values))
     assert "\n" not in str(caught.value)
-    assert next(iter(settings)) in str(caught.value) or "deep" in str(caught.value)
+    assert {"sensors": "noise", "control": "heading_gian", "mission": "depths"}[key] in str(caught.value)
 
 
 def test_a_part_that_is_not_there_is_named(folder: Path) -> None:
