@@ -44,10 +44,24 @@ def test_version_is_the_same_everywhere() -> None:
     assert str(yaml.safe_load((ROOT / "CITATION.cff").read_text())["version"]) == auvsim.__version__
 
 
-def test_the_printed_log_format_is_the_log_format():
-    from auvsim.data.log import table_markdown
+def test_log_format_in_the_documentation_is_printed() -> None:
+    """The page is what `python -m auvsim.simulation.log_format` prints."""
+    from auvsim.simulation.log_format import markdown
 
-    assert (ROOT / "docs" / "log_format.md").read_text() == table_markdown() + "\n"
+    assert (ROOT / "docs" / "log_format.md").read_text() == markdown() + "\n"
+
+
+def test_log_format_has_every_shipped_sensor_and_mission() -> None:
+    """Each stands in the page by its kind, with each of its own variables."""
+    from auvsim.missions.registry import MISSIONS
+    from auvsim.sensors.registry import SENSORS
+
+    page = (ROOT / "docs" / "log_format.md").read_text()
+    for kind in SENSORS:
+        assert f"Sensor of kind `{kind}`:" in page
+    for kind, mission in MISSIONS.items():
+        _, _, part = page.partition(f"Mission of kind `{kind}`:")
+        assert all(f"| {name} |" in part.split("\n\n")[1] for name in ("phase", *mission.variables))
 
 
 def test_the_printed_columns_of_a_campaign_are_its_columns():
