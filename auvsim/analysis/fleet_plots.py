@@ -39,7 +39,9 @@ def fleet_figure(log: Log) -> Figure:
         time = figure.add_subplot(grid[row, 1], sharex=time)
         draw(time, log)
         time.set_xlim(0.0, _end(log))
-    entries: dict[str, Any] = {name: Line2D([], [], color=vehicle_colour(i), lw=2.2) for i, name in enumerate(log.vehicles)}
+    entries: dict[str, Any] = {
+        name: Line2D([], [], color=vehicle_colour(i), lw=2.2) for i, name in enumerate(log.vehicles)
+    }
     plan = dict(zip(*reversed(figure.axes[0].get_legend_handles_labels()), strict=True))
     entries |= {"estimate": Line2D([], [], color="black", **ESTIMATE)}
     legend(figure, entries | {name: plan[name] for name in ("start", "end", "dock", "dock axis") if name in plan})
@@ -83,7 +85,9 @@ def _phases(axes: Axes, log: Log) -> None:
             axes.barh(row, length, left=begin, height=0.7, color=phase_colour(vehicle.phases, phase), alpha=0.75)
             if length > LEAST_NAMED * _end(log):
                 text = phase_name(vehicle.phases, phase)
-                axes.text(begin + length / 2.0, row, text, ha="center", va="center", fontsize=9, color="white", clip_on=True)
+                axes.text(
+                    begin + length / 2.0, row, text, ha="center", va="center", fontsize=9, color="white", clip_on=True
+                )
     axes.set_yticks(range(len(log.vehicles)), log.vehicles)
     axes.invert_yaxis()
     dress(axes, "Phases of the missions", "", "")

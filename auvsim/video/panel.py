@@ -32,7 +32,13 @@ class Panel:
     def put(self, text: str, x: float, baseline: float, style: Style) -> None:
         """Writes a text."""
         k, corner = self._k, self._corner
-        write(self._picture, text, corner.x + round(x * k), corner.y + round(baseline * k), style._replace(size=style.size * k))
+        write(
+            self._picture,
+            text,
+            corner.x + round(x * k),
+            corner.y + round(baseline * k),
+            style._replace(size=style.size * k),
+        )
 
     def block(self, x: float, y: float, width: float, height: float, colour: marks.Colour | str) -> None:
         """Fills a rectangle."""
