@@ -114,7 +114,8 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
 def verdict(playback: Playback) -> str:
     """How the run ended, in a line; of several vehicles, how each did."""
     if playback.lone:
-        return _end_of(playback.first)
+        end, attempt = _end_of(playback.first), playback.first.at(playback.end).count
+        return f"{end}, attempt {attempt}" if end.startswith("docked") else end
     ends = {name: _end_of(motion) for name, motion in playback.motions.items()}
     return "; ".join(f"{name} {text}" for name, text in ends.items())
 
@@ -124,7 +125,7 @@ def _end_of(motion: Motion) -> str:
     kinds, texts, times = log["event"]["kind"], log["event"]["text"], log["event"]["time"]
     for kind, text, time in zip(kinds[::-1], texts[::-1], times[::-1], strict=True):
         if kind == "docked":
-            return f"docked after {time:.0f} s, attempt {motion.at(float(time)).count}"
+            return f"docked after {time:.0f} s"
         if kind == "done":
             return f"finished after {time:.0f} s"
         if kind in ("aborted", "timeout", "diverged", "interrupted", "manoeuvre"):
