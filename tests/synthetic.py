@@ -24,7 +24,13 @@ DOCK_HEADING = 0.6
 NOSE = 0.8
 CURRENT = np.array([0.2, -0.15, 0.0])
 PHASES = Docking.phases
-CHANNELS = {"rudder_upper": "rad", "rudder_lower": "rad", "plane_port": "rad", "plane_starboard": "rad", "shaft": "rad/s"}
+CHANNELS = {
+    "rudder_upper": "rad",
+    "rudder_lower": "rad",
+    "plane_port": "rad",
+    "plane_starboard": "rad",
+    "shaft": "rad/s",
+}
 DEMANDS = {"rudder": "rad", "elevator": "rad", "shaft_speed": "rad/s"}
 # Of a docking through a full scenario, whose model names the video composes again.
 SCENARIO = f"""
@@ -235,7 +241,10 @@ def fleet_log() -> Log:
         "auv_3": {"dock": "", "usbl_structure": "west", "mission": "track", "mission_settings": TRACK},
     }
     found = writers(vehicles, docks, {**ATTRIBUTES, "scenario": FLEET_SCENARIO})
-    record(found["auv_1"], [(-80, 9), (-40, 0.3), (-0.5, 0.1)], 1, dock=np.array([20.0, -200.0, 5.0]), heading=2.0)
+    west = np.array([20.0, -200.0, 5.0])
+    record(found["auv_1"], [(-80, 9), (-40, 0.3), (-0.5, 0.1)], 1, dock=west, heading=2.0)
+    for time in np.arange(53.7, 202.0, 0.1):  # held in its dock
+        found["auv_1"].truth(truth(time, from_dock(-0.5, 0.1, 0.0, 2.0, west), (0.0, 0.0, 2.0), (0.0, 0.0, 0.0)))
     record(found["auv_2"], STRAIGHT, 2, dock=np.array([-30.0, 180.0, 5.0]))
     third = found["auv_3"]
     for time in np.arange(0.0, 120.0, 0.1):

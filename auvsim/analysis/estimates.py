@@ -140,7 +140,7 @@ def fix_fates(log: VehicleLog) -> NDArray[Any]:
 
 def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
-    if "usbl" not in log:
+    if "usbl" not in log or not len(log["usbl"]["time"]):
         return np.empty((0, 2))
     dock, source = _usbl(log)
     origin = dock.position[:2]

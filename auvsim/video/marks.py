@@ -56,7 +56,12 @@ class Tracks:
             marks.append(Mark(float(time), DOT, dot, place, place, REFUSED if reason else FIX))
         true, believed = corners, beliefs
         return cls(
-            colour=colour, true=true[0], true_times=true[1], believed=believed[0], believed_times=believed[1], marks=marks
+            colour=colour,
+            true=true[0],
+            true_times=true[1],
+            believed=believed[0],
+            believed_times=believed[1],
+            marks=marks,
         )
 
     def tips(self, layer: Layer, time: float, now: VehicleMoment) -> None:

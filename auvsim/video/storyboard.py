@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from auvsim.analysis.estimates import AT_REST
@@ -67,7 +66,7 @@ def storyboard(playback: Playback, fps: float, lapse: float | None = None) -> li
 
 
 def near_dock(motion: Motion) -> NDArray[np.bool_]:
-    """Whether a vehicle is looked at in its dock, (n,) for the samples of its truth: until it has stood there a while."""
+    """Whether a vehicle is looked at near its dock, (n,) for the samples of its truth: until it has stayed a while."""
     return (motion.ranges < NEAR) & (motion.times <= motion.over_at() + AFTER)
 
 
@@ -103,8 +102,9 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
     for name, motion in playback.motions.items():
         near = near_dock(motion)
         at = np.clip(np.searchsorted(motion.times, times), 0, len(motion.times) - 1)  # samples of this vehicle
-        speeds = np.minimum(speeds, speed_ups(motion, near, lapse)[at])
-        nearest = near[at] & (motion.ranges[at] < ranges)
+        moving = times <= motion.end + AFTER  # what a diverged one was near to does not matter later
+        speeds = np.where(moving, np.minimum(speeds, speed_ups(motion, near, lapse)[at]), speeds)
+        nearest = near[at] & moving & (motion.ranges[at] < ranges)
         ranges[nearest], focus[nearest] = motion.ranges[at][nearest], name
     looked = np.isfinite(ranges)
     latest = np.maximum.accumulate(np.where(looked, np.arange(len(times)), 0))  # between two looks, as in the last

@@ -232,17 +232,16 @@ def test_a_fleet_is_on_one_page(tmp_path: Path):
     assert {text.get_text() for text in plan.texts} == {"west", "east", "auv_1", "auv_2", "auv_3"}
     np.testing.assert_allclose(errors.get_lines()[2].get_ydata(), 0.5, atol=1e-9)  # 0.3 and 0.4 m, 1.2 m of depth apart
     assert [text.get_text() for text in phases.texts][-1] == "under way"
-    third = phases.patches[-1]
-    assert (third.get_x(), third.get_x() + third.get_width()) == pytest.approx((5.0, 119.9))
-    assert figure.get_suptitle().splitlines()[1:] == [
-        "auv_1: docked at 53.6 s, 1 attempt",
-        "auv_2: docked at 200.9 s, 1 attempt",
-        "auv_3: track not finished (complete), 5.00 m rms off its legs",
-    ]
+    bar = phases.patches[-1]
+    assert (bar.get_x(), bar.get_x() + bar.get_width()) == pytest.approx((5.0, 119.9))
+    first, second, third = figure.get_suptitle().splitlines()[1:]
+    assert first.startswith("auv_1: docked at 53.6 s, 1 attempt, nose 0.")
+    assert second.startswith("auv_2: docked at 200.9 s, 1 attempt, nose 0.")
+    assert third == "auv_3: track not finished (complete), 5.00 m rms off its legs"
 
 
 def test_one_vehicle_of_a_fleet_has_its_own_pages(tmp_path: Path):
-    """With its name in the title; without a dock of its own the distance from its track, and the dock that serves it."""
+    """Its name in the title; without a dock of its own the distance from its track, and the dock that serves it."""
     third = fleet_log().vehicle("auv_3")
     figure = track_figure(third)
     assert figure.get_suptitle().startswith("Trial 0, seed 7, auv_3: track not finished")

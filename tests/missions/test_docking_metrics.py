@@ -7,15 +7,14 @@ import numpy as np
 import pytest
 from synthetic import DOCK, DOCK_HEADING, GO_AROUND, NOSE, empty_log, from_dock, trial_log, truth, writer
 
-from auvsim.base.frames import rotation
-from auvsim.base.reading import Reading
 from auvsim.analysis.estimates import estimate_errors, estimate_quality, fix_fates, fixes, refusals
 from auvsim.analysis.summary import summarise
+from auvsim.base.frames import rotation
+from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog
 from auvsim.data.phases import phase_at
 from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position, to_body
 from auvsim.missions.docking.metrics import crossings
-
 
 SPEED = 1.5  # along the dock axis [m/s]
 
@@ -114,7 +113,7 @@ def test_nose_and_dock_frame_agree_with_rotation_matrices():
     body = [rotation(*a).T @ p for a, p in zip(attitudes, points, strict=True)]
     np.testing.assert_allclose(to_body(log["truth"]["quaternion"], points), body, atol=1e-14)
     world = np.array([from_dock(*p) for p in points])
-    np.testing.assert_allclose(in_dock_frame(log.structure, world), points, atol=1e-14)
+    np.testing.assert_allclose(in_dock_frame(log.log.structure("dock"), world), points, atol=1e-14)
 
 
 def test_constant_errors_are_their_own_rms():

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from synthetic import trial_log, writer
 
+from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import euler_to_quaternion, rotation, wrap
-from auvsim.base import yaml_text
 from auvsim.data.log import VehicleLog
 from auvsim.missions.manoeuvres import metrics
 from auvsim.missions.manoeuvres.metrics import Motion
@@ -155,7 +155,9 @@ def test_an_interrupted_manoeuvre_has_no_figures_of_what_did_not_begin() -> None
 def test_what_was_done_is_read_from_logs_of_any_format(form: str) -> None:
     """New logs say it of the vehicle; those of formats 1 and 2 in their scenario alone."""
     text = "manoeuvre: {kind: spiral, rudder_deg: 8.0, step_deg: 4.0, hold: 11.0}\n"
-    recorder = writer("manoeuvre", **({"mission_settings": f"kind: manoeuvre\n{text}"} if form == "mission_settings" else {}))
+    recorder = writer(
+        "manoeuvre", **({"mission_settings": f"kind: manoeuvre\n{text}"} if form == "mission_settings" else {})
+    )
     log = recorder.finish("complete")
     if form == "old scenario":
         log.log.attributes["scenario"] = f"duration: 400.0\nvehicle: {{model: remus100}}\n{text}"
@@ -166,9 +168,9 @@ def test_what_was_done_is_read_from_logs_of_any_format(form: str) -> None:
 
 def test_settings_that_cannot_be_read_are_bad_input() -> None:
     log = writer("manoeuvre", mission_settings="manoeuvre: {kind: spiral, hold: fast}").finish("complete")
-    with pytest.raises(InputError, match="mission of 'remus100'.*hold"):
+    with pytest.raises(InputError, match=r"mission of 'remus100'.*hold"):
         metrics.settings(log)
-    with pytest.raises(InputError, match="mission of 'remus100'.*manoeuvre"):
+    with pytest.raises(InputError, match=r"mission of 'remus100'.*manoeuvre"):
         metrics.settings(writer("manoeuvre", mission_settings="kind: manoeuvre").finish("complete"))
 
 
