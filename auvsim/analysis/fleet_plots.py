@@ -66,9 +66,9 @@ def _plan(axes: Axes, log: Log) -> None:
         colour, estimate = vehicle_colour(index), log.vehicle(name)["estimate"]
         axes.plot(*track[:, 1::-1].T, color=colour, lw=2.2)
         axes.plot(*estimate["position"][estimate["initialised"], 1::-1].T, color="black", **ESTIMATE)
-        label = {"start": "start", "end": "end"} if index == 0 else {}
-        axes.plot(*track[:1, 1::-1].T, "o", color="white", mec=colour, ms=9, label=label.get("start"), zorder=6)
-        axes.plot(*track[-1:, 1::-1].T, "s", color=colour, ms=6, label=label.get("end"), zorder=6)
+        names = (None, None) if index else ("start", "end")
+        axes.plot(*track[:1, 1::-1].T, "o", color="white", mec=colour, ms=9, label=names[0], zorder=6)
+        axes.plot(*track[-1:, 1::-1].T, "s", color=colour, ms=6, label=names[1], zorder=6)
         for place in track[:1, 1::-1]:
             style: dict[str, Any] = {"color": colour, "fontsize": 10.5, "fontweight": "bold", "zorder": 7}
             axes.annotate(name, tuple(place), (8, 8), textcoords="offset points", **style)
