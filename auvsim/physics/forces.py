@@ -22,11 +22,15 @@ HULL |= {
     "strip_x": (HEAD + 112, STRIPS),
     "strip_area": (HEAD + 112 + STRIPS, STRIPS),
 }
+# Of the strips, for the surface; worked out by `hydrodynamics`, not given. Their centre is the origin. Deeper than
+# `reach` a hull is all under water.
+DERIVED = {"strip_volume": (HEAD + 112 + 2 * STRIPS, STRIPS), "strip_radius": (HEAD + 112 + 3 * STRIPS, STRIPS)}
+DERIVED |= {"strip_half_length": (HEAD + 112 + 4 * STRIPS, STRIPS), "reach": (HEAD + 112 + 5 * STRIPS, 1)}
 FIN = {"area": (HEAD, 1), "lift_slope": (HEAD + 1, 1), "stall_angle": (HEAD + 2, 1), "drag": (HEAD + 3, 1)}
 FIN |= {"induced_drag": (HEAD + 4, 1), "normal_drag": (HEAD + 5, 1), "astern_lift": (HEAD + 6, 1)}
 PROPELLER = {"diameter": (HEAD, 1), "thrust_coefficients": (HEAD + 1, 2), "torque_coefficients": (HEAD + 3, 2)}
 PROPELLER |= {"wake_fraction": (HEAD + 5, 1), "thrust_deduction": (HEAD + 6, 1), "swirl_recovery": (HEAD + 7, 1)}
-RECORD = HEAD + 112 + 2 * STRIPS  # numbers a body needs: its `nuser_body`
+RECORD = HEAD + 113 + 5 * STRIPS  # numbers a body needs: its `nuser_body`
 
 _MASS, _LIFT, _LIFT_X = HULL["added_mass"][0], HULL["body_lift"][0], HULL["body_lift_x"][0]
 _CROSS_FLOW, _STRIP_X, _STRIP_AREA = HULL["cross_flow_drag"][0], HULL["strip_x"][0], HULL["strip_area"][0]

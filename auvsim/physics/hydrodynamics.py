@@ -16,6 +16,7 @@ from auvsim.base.frames import Array, flip_matrix
 from auvsim.physics import fluid
 from auvsim.physics.forces import (
     DENSITY,
+    DERIVED,
     FIN,
     FIN_KIND,
     HULL,
@@ -115,7 +116,38 @@ def _record(body: Body, slot: int, density: float) -> Array:
     for field, value in body.fields.items():
         value = flip_matrix(value) if field in _MATRICES else value
         record[table[field][0] : table[field][0] + value.size] = value.ravel()
+    if body.kind == "hull":
+        for field, value in _strips(body.fields).items():
+            at = {**HULL, **DERIVED}[field][0]
+            record[at : at + value.size] = value
     return record
+
+
+def _strips(fields: dict[str, Array]) -> dict[str, Array]:
+    """The cylinders along a hull's axis whose volume the surface cuts, and how deep none is cut.
+
+    Lengths are from the strips' spacing, diameters from their areas, volumes in proportion, sloped along the axis so
+    that their centre is the origin. A hull without strips, or whose strips do not allow that, is one cylinder as long
+    as thick.
+    """
+    volume = fields["displaced_volume"][0]
+    x, area = fields.get("strip_x", np.zeros(0)), fields.get("strip_area", np.zeros(0))
+    if x.size > 1 and np.all(np.diff(x) > 0) and np.all(area > 0):
+        length = np.gradient(x)
+        radius = 0.5 * area / length
+        share = radius**2 * length
+        share *= 1.0 - x * (share @ x) / (share @ x**2)
+        if np.all(share > 0):
+            reach = 1.5 * np.max(np.abs(x) + np.hypot(radius, 0.5 * length))  # waves may be as steep as 1 in 2
+            return {
+                "strip_volume": volume * share / share.sum(),
+                "strip_radius": radius,
+                "strip_half_length": 0.5 * length,
+                "reach": np.array([reach]),
+            }
+    radius = np.cbrt(volume / (2.0 * np.pi))
+    one = np.array([radius])
+    return {"strip_volume": np.array([volume]), "strip_radius": one, "strip_half_length": one, "reach": 1.5 * one}
 
 
 def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
