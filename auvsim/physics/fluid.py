@@ -44,6 +44,7 @@ from auvsim.physics.forces import (
     fin_force,
     hull_force,
     propeller_force,
+    shaft_brake,
 )
 from auvsim.physics.pointers import integers, load_pointer, numbers, scratch
 from auvsim.physics.submergence import share_under, volume_out
@@ -218,7 +219,7 @@ def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, 
     thrust, torque = share * thrust, share * torque
     F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
     T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
-    qfrc[dof] += torque
+    qfrc[dof] += torque + shaft_brake(c, o, ahead, hinge / (2.0 * math.pi))
     # The hull feels the torque less what the tail recovers from the swirl.
     torque *= 1.0 - c[o + _SWIRL]
     T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque

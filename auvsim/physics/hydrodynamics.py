@@ -15,6 +15,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip_matrix
 from auvsim.physics import fluid
 from auvsim.physics.forces import (
+    BRAKE,
     DENSITY,
     DERIVED,
     FIN,
@@ -30,6 +31,7 @@ from auvsim.physics.forces import (
 )
 
 SEA_WATER = 1026.0  # density [kg/m3], as the REMUS-100 reference has it
+BRAKE_TIME = 0.02  # time in which a shaft faster than its motor's limits slows down [s]
 
 _KINDS = {"hull": (HULL_KIND, HULL), "fin": (FIN_KIND, FIN), "propeller": (PROPELLER_KIND, PROPELLER)}
 _REQUIRED = {
@@ -103,6 +105,11 @@ def _check(index: int, name: str, fields: dict[str, Array]) -> Body:
             raise InputError(f"'{name}_{field}' is not symmetric")
         if np.linalg.eigvalsh(matrix + matrix.T).min() < -1e-9 * max(1.0, np.abs(matrix).max()):
             raise InputError(f"'{name}_{field}' is not positive semidefinite (M_A and D are positive here)")
+    if fields.get("astern_loss", np.zeros(1))[0] > 1.0:
+        raise InputError(f"'{name}_astern_loss' is {fields['astern_loss'][0]:g}; it is a share, at most 1")
+    for field in ("torque_limit", "power_limit"):
+        if field in fields and fields[field][0] > 0.0 >= fields["torque_coefficients"][0]:
+            raise InputError(f"'{name}_{field}' needs a positive K_Q0 in '{name}_torque_coefficients'")
     if np.any(fields.get("quadratic_damping", np.zeros((6, 6))).diagonal() < 0):
         raise InputError(f"'{name}_quadratic_damping' has a negative diagonal (D is positive here)")
     return Body(index, name, kind, fields)
@@ -177,6 +184,9 @@ def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
         base = model.body_rootid[body.index]
         slot = slots.setdefault(model.body(base).name, fluid.WATER * len(slots))
         model.body_user[body.index, :RECORD] = _record(body, slot, density)
+        if body.kind == "propeller":
+            armature = model.dof_armature[model.body_dofadr[body.index]]
+            model.body_user[body.index, BRAKE] = armature / BRAKE_TIME
     if model.nuserdata < fluid.WATER * len(slots):
         raise InputError(
             f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}"

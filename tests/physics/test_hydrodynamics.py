@@ -155,6 +155,8 @@ def test_equipping_twice_is_equipping_once():
             "'hull_strip_x' has 17 numbers; strip_x and strip_area want as many, <= 16",
         ),
         ({"hull_strip_x": "0 1", "hull_strip_area": "1"}, "'hull_strip_area' has 1 numbers"),
+        ({"screw_astern_loss": "1.2"}, "'screw_astern_loss' is 1.2; it is a share, at most 1"),
+        ({"screw_power_limit": "50", "screw_torque_coefficients": "0 0"}, "'screw_power_limit' needs a positive K_Q0"),
     ],
 )
 def test_a_wrong_field_is_named(fields, expected):
