@@ -52,7 +52,8 @@ def scene(*parts, boats=()):
     """A model of the parts, equipped if there are boats; the boats have no geoms, so nothing touches them."""
     custom = "".join(numerics(name) for name in boats)
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><size nuser_body="{RECORD}" nuserdata="{2 * fluid.WATER}"/><option integrator="implicitfast" timestep="0.005"/>'
+        f'<mujoco><size nuser_body="{RECORD}" nuserdata="{2 * fluid.WATER}"/>'
+        '<option integrator="implicitfast" timestep="0.005"/>'
         f"<worldbody>{''.join(parts)}</worldbody><custom>{custom}</custom></mujoco>"
     )
     slots = hydrodynamics.equip(model)

@@ -192,7 +192,7 @@ def steady_rate(u, rpm, seconds=6.0, **numbers):
 
 @pytest.mark.parametrize(("u", "rpm"), [(0.0, 1525), (1.5, 1525), (0.5, -1525)])
 def test_torque_and_power_limits_hold_the_shaft_back(u, rpm):
-    """The rate settles where the water takes what the motor has: within 2 per cent, servo against brake of 1 s to 20 ms."""
+    """The rate settles where the water takes what the motor has, within 2 per cent: a servo of 1 s against 20 ms."""
     n, Q = steady_rate(u, rpm)
     assert n == pytest.approx(1525 / 60, rel=0.01)
     held, torque = steady_rate(u, rpm, torque_limit=0.6 * Q)

@@ -49,7 +49,7 @@ def cylinder(density=0.7, added=None, drag=0.0, timestep=0.005, **more):
     )
 
 
-def still(model, position, rotation=None, nu=np.zeros(6), elevation=0.0):
+def still(model, position, rotation=None, nu=(0, 0, 0, 0, 0, 0), elevation=0.0):
     """Force (6,) in body axes on the hull at a place, with a surface over still water."""
     data = mujoco.MjData(model)
     set_surface(data, elevation)
@@ -106,6 +106,14 @@ def test_strips_off_the_middle_still_centre_their_buoyancy():
     pitched = Rotation.from_euler("y", 0.4).as_matrix()
     assert still(model, [0, 0, -3.0], pitched) == pytest.approx(np.zeros(6), abs=1e-10)
     assert still(model, [0, 0, 3.0], pitched)[:3] @ pitched[2] == pytest.approx(-DENSITY * 0.02 * GRAVITY)
+
+
+def test_a_cylinder_on_end_goes_in_strip_by_strip():
+    """Buoyancy grows in proportion to its length under water; a strip enters as a disc does, not as a cylinder."""
+    upright = Rotation.from_euler("y", np.pi / 2).as_matrix()
+    for depth in np.linspace(-0.7, 0.7, 29):
+        share = -still(cylinder(), [0, 0, depth], upright) @ [*upright[2], 0, 0, 0] / (DENSITY * VOLUME * GRAVITY)
+        assert share == pytest.approx(0.5 + 0.5 * depth / HALF, abs=0.006)  # a tenth of a strip's sixteenth
 
 
 def test_deep_water_has_no_surface_bit_for_bit():
@@ -230,7 +238,7 @@ def flight(surface):
 
 
 def test_a_vehicle_cannot_fly():
-    """It leaps no higher than its speed carries it, v^2 / 2 g = 0.27 m, and stays afloat; water without end it climbs."""
+    """It leaps no higher than its speed carries it, v^2 / 2 g = 0.27 m, and floats; in water without end it climbs."""
     assert flight(0.0)[0] > 5.0
     highest, data = flight(1.0)
     assert highest < 0.3
