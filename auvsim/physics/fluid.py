@@ -15,7 +15,7 @@ they are an approximation, which has the lift coefficient of a sphere, 1/2 (Auto
 
 The water is a local expansion in `mjData.userdata`, one slot a vehicle (see `water_slot`). Where it has a surface,
 buoyancy is that of the strips under water; the other forces of a hull, and its added mass, fade with the share of its
-volume that is under water, those of fins and propellers with the share of their area. What a breaking surface adds
+volume that is under water, those of fins, propellers and thrusters with the share of their area. What a breaking surface adds
 (slamming, ventilation, waves made) is left out.
 """
 
@@ -32,6 +32,7 @@ from numba.core.caching import FunctionCache
 
 from auvsim.physics import mujoco_structs
 from auvsim.physics.forces import (
+    CHANNEL,
     DENSITY,
     FIN,
     FIN_KIND,
@@ -40,11 +41,14 @@ from auvsim.physics.forces import (
     PROPELLER,
     PROPELLER_KIND,
     SLOT,
+    THRUSTER,
+    THRUSTER_KIND,
     added_momentum,
     fin_force,
     hull_force,
     propeller_force,
     shaft_brake,
+    thruster_force,
 )
 from auvsim.physics.pointers import integers, load_pointer, numbers, scratch
 from auvsim.physics.submergence import share_under, volume_out
@@ -55,6 +59,7 @@ __all__ = ["WATER", "install", "is_warm"]
 _MASS, _VOLUME = HULL["added_mass"][0], HULL["displaced_volume"][0]
 _SWIRL, _DIAMETER = PROPELLER["swirl_recovery"][0], PROPELLER["diameter"][0]
 _AREA = FIN["area"][0]
+_SIZE, _REACTION = THRUSTER["size"][0], THRUSTER["reaction"][0]
 _scratch = scratch(42)  # a hull's Jacobian (6, 6) and a row of its product
 
 
@@ -192,8 +197,11 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
 
 
 @njit(cache=True, error_model="numpy")
-def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, parent, dof, qfrc):
-    """Forces of a fin or a propeller, from the local velocity at its origin; `hinge` is the shaft's rate [rad/s]."""
+def _part(kind, c, o, body, water, time, xpos, xmat, cvel, drive, com, cdof, parent, dof, qfrc):
+    """Forces of a fin, propeller or thruster, from the local velocity at its origin.
+
+    `drive` is a shaft's rate [rad/s], or a thruster's command.
+    """
     R = 9 * body
     x0, x1, x2 = xpos[3 * body], xpos[3 * body + 1], xpos[3 * body + 2]
     a0, a1, a2 = x0 - com[0], x1 - com[1], x2 - com[2]
@@ -214,12 +222,23 @@ def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, 
         F2 = xmat[R + 6] * chord + xmat[R + 7] * normal
         _apply(qfrc, cdof, parent, dof, F0, F1, F2, a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0)
         return
-    thrust, torque = propeller_force(c, o, ahead, hinge / (2.0 * math.pi))
+    if kind == THRUSTER_KIND:
+        across2 = max(u0 * u0 + u1 * u1 + u2 * u2 - ahead * ahead, 0.0)
+        thrust = thruster_force(c, o, ahead, across2, drive)
+        thrust *= share_under(water, slot, time, x0, x1, x2, 0.5 * c[o + _SIZE])
+        F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
+        torque = -c[o + _REACTION] * thrust
+        T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
+        T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque
+        _apply(qfrc, cdof, parent, dof, F0, F1, F2, T0, T1, T2)
+        return
+    n = drive / (2.0 * math.pi)
+    thrust, torque = propeller_force(c, o, ahead, n)
     share = share_under(water, slot, time, x0, x1, x2, 0.5 * c[o + _DIAMETER])
     thrust, torque = share * thrust, share * torque
     F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
     T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
-    qfrc[dof] += torque + shaft_brake(c, o, ahead, hinge / (2.0 * math.pi))
+    qfrc[dof] += torque + shaft_brake(c, o, ahead, n)
     # The hull feels the torque less what the tail recovers from the swirl.
     torque *= 1.0 - c[o + _SWIRL]
     T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque
@@ -239,6 +258,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
     d_time, d_userdata, d_xpos, d_xmat = data_at["time"], data_at["userdata"], data_at["xpos"], data_at["xmat"]
     d_cvel, d_com, d_cdof = data_at["cvel"], data_at["subtree_com"], data_at["cdof"]
     d_qfrc, d_M, d_qvel = data_at["qfrc_passive"], data_at["M"], data_at["qvel"]
+    d_act, d_ctrl = data_at["act"], data_at["ctrl"]
 
     @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
     def passive(m, d):
@@ -256,6 +276,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
         coms, cdof = load_pointer(d + d_com), numbers(load_pointer(d + d_cdof))
         qfrc, M = numbers(load_pointer(d + d_qfrc)), numbers(load_pointer(d + d_M))
         qvel = numbers(load_pointer(d + d_qvel))
+        act, control = numbers(load_pointer(d + d_act)), numbers(load_pointer(d + d_ctrl))
         J = _scratch()
         touched = False
         for body in range(1, nbody):
@@ -275,7 +296,12 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
                 _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, at, qfrc, M, rows, J)
             elif kind in (FIN_KIND, PROPELLER_KIND):
                 dof = dofadr[base] + dofnum[base] - 1
-                _surface(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
+                _part(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
+            elif kind == THRUSTER_KIND:
+                dof = dofadr[base] + dofnum[base] - 1
+                at = int(c[o + CHANNEL])
+                command = act[at] if at >= 0 else control[-1 - at]
+                _part(kind, c, o, body, water, time, xpos, xmat, cvel, command, com, cdof, parent, dof, qfrc)
         if touched:
             _factor_M(m, d)
             _project(m, d)

@@ -1,8 +1,8 @@
-"""Forces of hull, fin and propeller as compiled functions of the velocity relative to the water.
+"""Forces of hull, fin, propeller and thruster as compiled functions of the velocity relative to the water.
 
 All vectors here are in the element's own MuJoCo axes (x forward, y port, z up); `hydrodynamics` converts the SNAME
-coefficients once. A coefficient record `c` starts at `o`; its layout is `HULL`, `FIN` and `PROPELLER` below, so that
-the same code serves a NumPy array and a row of `mjModel.body_user`.
+coefficients once. A coefficient record `c` starts at `o`; its layout is `HULL`, `FIN`, `PROPELLER` and `THRUSTER`
+below, so that the same code serves a NumPy array and a row of `mjModel.body_user`.
 """
 
 import math
@@ -13,7 +13,7 @@ STRIPS = 16  # the most cross-flow strips a hull may have
 
 # Offsets of the coefficient records behind the common head [kind, water slot, water density].
 KIND, SLOT, DENSITY, HEAD = 0, 1, 2, 3
-HULL_KIND, FIN_KIND, PROPELLER_KIND = 1, 2, 3
+HULL_KIND, FIN_KIND, PROPELLER_KIND, THRUSTER_KIND = 1, 2, 3, 4
 
 HULL = {"added_mass": (HEAD, 36), "linear_damping": (HEAD + 36, 36), "quadratic_damping": (HEAD + 72, 36)}
 HULL |= {"displaced_volume": (HEAD + 108, 1), "body_lift": (HEAD + 109, 1), "body_lift_x": (HEAD + 110, 1)}
@@ -33,6 +33,9 @@ PROPELLER = {"diameter": (HEAD, 1), "thrust_coefficients": (HEAD + 1, 2), "torqu
 PROPELLER |= {"wake_fraction": (HEAD + 5, 1), "thrust_deduction": (HEAD + 6, 1), "swirl_recovery": (HEAD + 7, 1)}
 PROPELLER |= {"astern_loss": (HEAD + 8, 1), "locked_drag": (HEAD + 9, 1)}
 PROPELLER |= {"torque_limit": (HEAD + 10, 1), "power_limit": (HEAD + 11, 1)}
+THRUSTER = {"thrust": (HEAD, 2), "size": (HEAD + 2, 1), "dead_band": (HEAD + 3, 1), "free_speed": (HEAD + 4, 2)}
+THRUSTER |= {"cross_flow_loss": (HEAD + 6, 1), "reaction": (HEAD + 7, 1)}
+CHANNEL = HEAD + 8  # of a thruster's record: its command in `mjData.act`, or -1 - its command in `mjData.ctrl`
 BRAKE = HEAD + 12  # of a propeller's record: what holds its shaft at its limits [N m s], worked out by `hydrodynamics`
 RECORD = HEAD + 114 + 5 * STRIPS  # numbers a body needs: its `nuser_body`
 
@@ -46,6 +49,8 @@ _DIAMETER, _THRUST = PROPELLER["diameter"][0], PROPELLER["thrust_coefficients"][
 _TORQUE, _WAKE = PROPELLER["torque_coefficients"][0], PROPELLER["wake_fraction"][0]
 _DEDUCTION, _ASTERN_LOSS = PROPELLER["thrust_deduction"][0], PROPELLER["astern_loss"][0]
 _LOCKED, _LIMIT, _POWER = PROPELLER["locked_drag"][0], PROPELLER["torque_limit"][0], PROPELLER["power_limit"][0]
+_FULL, _DEAD, _FREE = THRUSTER["thrust"][0], THRUSTER["dead_band"][0], THRUSTER["free_speed"][0]
+_CROSS_LOSS = THRUSTER["cross_flow_loss"][0]
 _BODY_INDUCED = HULL["body_induced_drag"][0]
 
 _inline = njit(cache=True, inline="never", error_model="numpy", fastmath=False)
@@ -225,3 +230,31 @@ def shaft_brake(c, o, v0, n):
     # K_Q0 n^2 + slope n = limit / scale
     most = (math.sqrt(slope * slope + 4.0 * c[o + _TORQUE] * limit / scale) - slope) / (2.0 * c[o + _TORQUE])
     return -c[o + BRAKE] * 2.0 * math.pi * math.copysign(max(abs(n) - most, 0.0), n)
+
+
+@_inline
+def thruster_force(c, o, v0, across, command):
+    """Thrust of a thruster along its axis [N].
+
+    Beyond the dead band the rate of the screw follows the command, and the thrust its square. Inflow along the thrust
+    takes the share (v / v_0) / rate, v_0 being the speed of no thrust at full rate (Fossen 2021, eq. 9.9: bilinear in
+    rate and inflow); inflow against it takes nothing. Flow across a tunnel takes the share 1 - exp(-c v^2) (Palmer,
+    Hearn & Stevenson 2008, Modelling tunnel thrusters for autonomous underwater vehicles).
+
+    Args:
+        c: coefficients, with the record at `o`.
+        v0: speed of the thruster along its axis relative to the water [m/s].
+        across: square of its speed across the axis [m2/s2].
+        command: -1 to 1; beyond, it is limited.
+    """
+    dead = c[o + _DEAD]
+    size = min(abs(command), 1.0)
+    if size <= dead:
+        return 0.0
+    rate = (size - dead) / (1.0 - dead)
+    way = 0 if command > 0.0 else 1
+    inflow = v0 if command > 0.0 else -v0
+    free = c[o + _FREE + way]
+    pull = rate * rate - (rate * inflow / free if free > 0.0 and inflow > 0.0 else 0.0)
+    thrust = c[o + _FULL + way] * pull * math.exp(-c[o + _CROSS_LOSS] * across)
+    return thrust if command > 0.0 else -thrust

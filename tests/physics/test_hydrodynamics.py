@@ -139,7 +139,10 @@ def test_equipping_twice_is_equipping_once():
     [
         ({"hull_wings": "1"}, "hull 'hull' has no field 'wings'; there are added_mass"),
         ({"keel_added_mass": "1"}, "numeric 'keel_added_mass' names no body; bodies: world, boat, hull, fin, screw"),
-        ({"boat_stall_angle": "1"}, "body 'boat' has the fields stall_angle but no boat_added_mass or boat_area"),
+        (
+            {"boat_stall_angle": "1"},
+            "body 'boat' has the fields stall_angle but no boat_added_mass or boat_area or boat_diam",
+        ),
         ({"hull_added_mass": "1 2 3"}, "'hull_added_mass' has 3 numbers instead of 36"),
         ({"screw_thrust_coefficients": "1"}, "'screw_thrust_coefficients' has 1 numbers instead of 2"),
         ({"fin_area": "nan"}, "'fin_area' is not finite"),
