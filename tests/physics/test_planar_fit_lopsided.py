@@ -1,7 +1,5 @@
 """The planar model of a vehicle whose weight and added mass are off-centre, against MuJoCo's own accelerations."""
 
-from pathlib import Path
-
 import lopsided
 import mujoco
 import numpy as np
