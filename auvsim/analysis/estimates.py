@@ -140,7 +140,7 @@ def fix_fates(log: VehicleLog) -> NDArray[Any]:
 
 def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
-    if "usbl" not in log:
+    if "usbl" not in log or not len(log["usbl"]["time"]):
         return np.empty((0, 2))
     dock = usbl_dock(log)
     forward, starboard, down = (dock.number(f"transceiver_{a}", 0.0) for a in ("forward", "starboard", "down"))

@@ -39,7 +39,9 @@ def fleet_figure(log: Log) -> Figure:
         time = figure.add_subplot(grid[row, 1], sharex=time)
         draw(time, log)
         time.set_xlim(0.0, _end(log))
-    entries: dict[str, Any] = {name: Line2D([], [], color=vehicle_colour(i), lw=2.2) for i, name in enumerate(log.vehicles)}
+    entries: dict[str, Any] = {
+        name: Line2D([], [], color=vehicle_colour(i), lw=2.2) for i, name in enumerate(log.vehicles)
+    }
     plan = dict(zip(*reversed(figure.axes[0].get_legend_handles_labels()), strict=True))
     entries |= {"estimate": Line2D([], [], color="black", **ESTIMATE)}
     legend(figure, entries | {name: plan[name] for name in ("start", "end", "dock", "dock axis") if name in plan})
@@ -64,9 +66,9 @@ def _plan(axes: Axes, log: Log) -> None:
         colour, estimate = vehicle_colour(index), log.vehicle(name)["estimate"]
         axes.plot(*track[:, 1::-1].T, color=colour, lw=2.2)
         axes.plot(*estimate["position"][estimate["initialised"], 1::-1].T, color="black", **ESTIMATE)
-        label = {"start": "start", "end": "end"} if index == 0 else {}
-        axes.plot(*track[:1, 1::-1].T, "o", color="white", mec=colour, ms=9, label=label.get("start"), zorder=6)
-        axes.plot(*track[-1:, 1::-1].T, "s", color=colour, ms=6, label=label.get("end"), zorder=6)
+        names = (None, None) if index else ("start", "end")
+        axes.plot(*track[:1, 1::-1].T, "o", color="white", mec=colour, ms=9, label=names[0], zorder=6)
+        axes.plot(*track[-1:, 1::-1].T, "s", color=colour, ms=6, label=names[1], zorder=6)
         for place in track[:1, 1::-1]:
             style: dict[str, Any] = {"color": colour, "fontsize": 10.5, "fontweight": "bold", "zorder": 7}
             axes.annotate(name, tuple(place), (8, 8), textcoords="offset points", **style)
@@ -83,7 +85,9 @@ def _phases(axes: Axes, log: Log) -> None:
             axes.barh(row, length, left=begin, height=0.7, color=phase_colour(vehicle.phases, phase), alpha=0.75)
             if length > LEAST_NAMED * _end(log):
                 text = phase_name(vehicle.phases, phase)
-                axes.text(begin + length / 2.0, row, text, ha="center", va="center", fontsize=9, color="white", clip_on=True)
+                axes.text(
+                    begin + length / 2.0, row, text, ha="center", va="center", fontsize=9, color="white", clip_on=True
+                )
     axes.set_yticks(range(len(log.vehicles)), log.vehicles)
     axes.invert_yaxis()
     dress(axes, "Phases of the missions", "", "")

@@ -1,4 +1,4 @@
-"""What plan views share: docks to scale with a symbol that can be seen, the mean current, limits round what is shown."""
+"""What plan views share: docks to scale with a symbol that can be seen, the mean current, limits."""
 
 import math
 from collections.abc import Sequence
@@ -36,17 +36,16 @@ def draw_docks(axes: Axes, docks: Sequence[StructureLog]) -> None:
     (west, east), (south, north) = axes.get_xlim(), axes.get_ylim()
     reach = 2.0 * max(east - west, north - south)
     for index, dock in enumerate(docks):
-        label = {} if index else {"label": "dock axis"}
+        names = (None, None) if index else ("dock axis", "dock")
         place = dock.position[1::-1]
         course = np.array([math.sin(dock.heading), math.cos(dock.heading)])  # east, north
-        axes.plot(*(place + np.outer((0.0, -reach), course)).T, ":", color=DOCK, lw=1.1, **label)
+        axes.plot(*(place + np.outer((0.0, -reach), course)).T, ":", color=DOCK, lw=1.1, label=names[0])
         walls = [wall @ np.array([course, [course[1], -course[0]]]) for wall in funnel_outline(dock)]
         for wall in walls:
             axes.plot(*(place + wall).T, color=DOCK, lw=2.0, zorder=5)
         # To scale it can be too small to see: a symbol of the same shape, mouth to the approaching vehicle.
         symbol = np.concatenate([walls[0], walls[1][::-1]])
-        label = {} if index else {"label": "dock"}
-        axes.plot(*place, marker=symbol, mfc="#f0d9c4", mec=DOCK, ms=26, ls="", zorder=2, **label)
+        axes.plot(*place, marker=symbol, mfc="#f0d9c4", mec=DOCK, ms=26, ls="", zorder=2, label=names[1])
         if len(docks) > 1:
             inward = 1.0 if place[0] < (west + east) / 2.0 else -1.0  # so that the name stays inside
             style: dict[str, Any] = {"color": DOCK, "fontsize": 10.5, "fontweight": "bold", "zorder": 7}
@@ -55,7 +54,7 @@ def draw_docks(axes: Axes, docks: Sequence[StructureLog]) -> None:
 
 
 def draw_current(axes: Axes, flow: Array, shown: Array) -> None:
-    """The mean of the current (n, 3) [m/s] as an arrow in the corner that the shown points, in -1..1, leave most free."""
+    """The mean current of (n, 3) [m/s] as an arrow in the corner that the shown points, in -1..1, leave most free."""
     corners = [(x, y) for y in (-0.8, 0.8) for x in (-0.7, 0.7)]
     x, y = min(corners, key=lambda corner: int(np.sum(np.abs(shown - np.array(corner)).max(axis=1) < 0.35)))
     inset = axes.inset_axes((0.5 + 0.5 * x - 0.1, 0.5 + 0.5 * y - 0.07, 0.2, 0.14))

@@ -92,8 +92,7 @@ def dress(axes: Axes, title: str, x: str, y: str) -> None:
 
 def event_ticks(axes: Axes, log: VehicleLog) -> None:
     """Ticks along the lower edge: fixes when they arrived, and when the estimator refused readings."""
-    usbl = log["usbl"] if "usbl" in log else None
-    arrived = [] if usbl is None else usbl["received"][~usbl["lost"]]
+    arrived = log["usbl"]["received"][~log["usbl"]["lost"]] if "usbl" in log else []
     refused, _ = refusals(log)
     for times, colour, width in ((arrived, ARRIVED, 1.0), (refused, OUTLIER, 1.6)):
         axes.vlines(times, 0.0, 0.07, color=colour, lw=width, transform=axes.get_xaxis_transform(), zorder=4)

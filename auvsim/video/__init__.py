@@ -91,7 +91,8 @@ def still(
     Args:
         log: of any status.
         path: of the picture.
-        time: of the run [s]; by default just before the first vehicle with a dock comes nearest to its mouth; else the end.
+        time: of the run [s]; by default just before the first vehicle with a dock comes nearest to its mouth,
+            or else the end.
         width: [pixels].
         height: [pixels].
         cameras: as for `render`.

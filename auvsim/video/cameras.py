@@ -52,7 +52,9 @@ class Cameras:
         if kind == "dock" and not known:
             raise InputError(f"camera '{view}': the log has no dock; there are overview, follow, above")
         if subject and (kind == "overview" or subject not in known):
-            raise InputError(f"camera '{view}': {kind} may be of {'all only' if kind == 'overview' else ', '.join(known)}")
+            raise InputError(
+                f"camera '{view}': {kind} may be of {'all only' if kind == 'overview' else ', '.join(known)}"
+            )
 
     def aim(self, view: str, moment: Moment, step: float) -> mujoco.MjvCamera:
         """A camera at a moment.

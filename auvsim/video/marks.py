@@ -22,7 +22,7 @@ DOCK: Colour = (1.0, 0.55, 0.2, 1.0)
 MOTE: Colour = (0.75, 0.92, 0.92, 1.0)
 
 FLEET: tuple[Colour, ...] = (  # of several vehicles, each with colours of its own
-    TRUE, (0.6, 1.0, 0.4, 1.0), (0.75, 0.65, 1.0, 1.0), (1.0, 0.7, 0.65, 1.0), (0.5, 0.75, 1.0, 1.0)
+    TRUE, (0.35, 0.9, 0.2, 1.0), (0.62, 0.45, 1.0, 1.0), (0.95, 0.5, 0.5, 1.0), (0.3, 0.6, 1.0, 1.0)
 )  # fmt: skip
 
 SIGMAS = 2.0  # of the ellipse round the estimate
@@ -56,7 +56,12 @@ class Tracks:
             marks.append(Mark(float(time), DOT, dot, place, place, REFUSED if reason else FIX))
         true, believed = corners, beliefs
         return cls(
-            colour=colour, true=true[0], true_times=true[1], believed=believed[0], believed_times=believed[1], marks=marks
+            colour=colour,
+            true=true[0],
+            true_times=true[1],
+            believed=believed[0],
+            believed_times=believed[1],
+            marks=marks,
         )
 
     def tips(self, layer: Layer, time: float, now: VehicleMoment) -> None:

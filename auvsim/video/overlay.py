@@ -1,5 +1,6 @@
 """Text and flat shapes on a finished picture: names of views and of what is in them, banners."""
 
+import math
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple

@@ -32,7 +32,13 @@ class Panel:
     def put(self, text: str, x: float, baseline: float, style: Style) -> None:
         """Writes a text."""
         k, corner = self._k, self._corner
-        write(self._picture, text, corner.x + round(x * k), corner.y + round(baseline * k), style._replace(size=style.size * k))
+        write(
+            self._picture,
+            text,
+            corner.x + round(x * k),
+            corner.y + round(baseline * k),
+            style._replace(size=style.size * k),
+        )
 
     def block(self, x: float, y: float, width: float, height: float, colour: marks.Colour | str) -> None:
         """Fills a rectangle."""
@@ -80,7 +86,7 @@ def _lone(on: Panel, motion: Motion, moment: Moment, speed: float) -> None:
         ("shown", _shown(speed)),
         ("depth", f"{-now.position[2]:.1f} m") if math.isnan(now.range) else ("nose to dock", _range(now)),
         ("over ground", f"{now.speed:.2f} m/s"),
-        ("estimate off by", _error(now)),
+        ("estimate off by", error(now)),
         ("current", _current(now)),
     ]
     for (name, value), (column, row) in zip(numbers, np.ndindex(3, 2), strict=True):
@@ -107,7 +113,7 @@ def _fleet(on: Panel, playback: Playback, moment: Moment, speed: float) -> None:
         on.block(104, y - 15, 118, 20, phase_colour(motion.phase_names, now.phase))
         on.put(shortened(_phase(motion, now), Style(14), 106), 110, y, Style(14, WHITE, bold=True))
         on.put("" if math.isnan(now.range) else _range(now), 232, y, Style(14))
-        on.put(_error(now), 308, y, Style(14))
+        on.put(error(now), 308, y, Style(14))
     if len(shown) < len(names):
         on.put(f"and {len(names) - len(shown)} more", 16, 102 + 24 * len(shown), Style(13, GREY))
 
@@ -124,7 +130,7 @@ def _range(now: VehicleMoment) -> str:
     return f"{now.range:.2f} m" if now.range < 20.0 else f"{now.range:.0f} m"
 
 
-def _error(now: VehicleMoment) -> str:
+def error(now: VehicleMoment) -> str:
     """Distance of the estimated position from the true one, depth included."""
     return "no fix yet" if now.belief is None else f"{math.dist(now.belief.position, now.position):.2f} m"
 

@@ -5,7 +5,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from auvsim.analysis.estimates import AT_REST
@@ -67,7 +66,7 @@ def storyboard(playback: Playback, fps: float, lapse: float | None = None) -> li
 
 
 def near_dock(motion: Motion) -> NDArray[np.bool_]:
-    """Whether a vehicle is looked at in its dock, (n,) for the samples of its truth: until it has stood there a while."""
+    """Whether a vehicle is looked at near its dock, (n,) for the samples of its truth: until it has stayed a while."""
     return (motion.ranges < NEAR) & (motion.times <= motion.over_at() + AFTER)
 
 
@@ -103,8 +102,9 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
     for name, motion in playback.motions.items():
         near = near_dock(motion)
         at = np.clip(np.searchsorted(motion.times, times), 0, len(motion.times) - 1)  # samples of this vehicle
-        speeds = np.minimum(speeds, speed_ups(motion, near, lapse)[at])
-        nearest = near[at] & (motion.ranges[at] < ranges)
+        moving = times <= motion.end + AFTER  # what a diverged one was near to does not matter later
+        speeds = np.where(moving, np.minimum(speeds, speed_ups(motion, near, lapse)[at]), speeds)
+        nearest = near[at] & moving & (motion.ranges[at] < ranges)
         ranges[nearest], focus[nearest] = motion.ranges[at][nearest], name
     looked = np.isfinite(ranges)
     latest = np.maximum.accumulate(np.where(looked, np.arange(len(times)), 0))  # between two looks, as in the last
@@ -114,7 +114,8 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
 def verdict(playback: Playback) -> str:
     """How the run ended, in a line; of several vehicles, how each did."""
     if playback.lone:
-        return _end_of(playback.first)
+        end, attempt = _end_of(playback.first), playback.first.at(playback.end).count
+        return f"{end}, attempt {attempt}" if end.startswith("docked") else end
     ends = {name: _end_of(motion) for name, motion in playback.motions.items()}
     return "; ".join(f"{name} {text}" for name, text in ends.items())
 
@@ -124,7 +125,7 @@ def _end_of(motion: Motion) -> str:
     kinds, texts, times = log["event"]["kind"], log["event"]["text"], log["event"]["time"]
     for kind, text, time in zip(kinds[::-1], texts[::-1], times[::-1], strict=True):
         if kind == "docked":
-            return f"docked after {time:.0f} s, attempt {motion.at(float(time)).count}"
+            return f"docked after {time:.0f} s"
         if kind == "done":
             return f"finished after {time:.0f} s"
         if kind in ("aborted", "timeout", "diverged", "interrupted", "manoeuvre"):

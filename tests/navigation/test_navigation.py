@@ -26,6 +26,7 @@ from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
 from estimators.docking.estimator import UsblFix
+from estimators.docking.models import DockingNoise
 
 DOCK = StructurePose(north=400.0, east=-300.0, depth=20.0, heading=0.7, pitch=0.05, roll=-0.04)
 MOUTH = DOCK.position[:2]
@@ -241,6 +242,21 @@ def test_averaging_reduces_white_noise() -> None:
         navigator.update(0.5 * (k + 1), [compass(0.5 * k + 0.1 * i, x) for i, x in enumerate(row / 57.3)], (), NONE)
     headings = np.array([tick.heading for tick in recorder.ticks]) * 57.3
     assert headings.std() == pytest.approx(1.0 / math.sqrt(5.0), rel=0.055)
+
+
+@pytest.mark.parametrize(("rate", "readings"), [(20.0, 10.0), (4.0, 2.0), (1.0, 1.0)])
+def test_the_mean_of_n_readings_weighs_as_one_with_a_deviation_smaller_by_root_n(rate: float, readings: float) -> None:
+    """The filter's first heading is one mean, its rate unknown; the second mean is fused with what that leaves."""
+    sensors = PLAN.sensors.model_copy(update={"compass": PLAN.sensors.compass.model_copy(update={"rate": rate})})
+    navigator = build("augmented_ekf", PLAN.model_copy(update={"sensors": sensors}))
+    navigator.update(0.5, [compass(0.5, 0.0)], NONE)
+    packet = Reading("usbl", 0.5, 1.0, np.array([-50.0, 1.0, 2.0, 0.0, 0.0, 0.0, 12.0]), 0)
+    estimate = navigator.update(1.0, [compass(1.0, 0.0), packet], NONE)
+    assert estimate is not None
+    mean = math.radians(PLAN.estimator.compass_deg) ** 2 / readings
+    left = mean + (0.5 * DockingNoise().initial_yaw_rate) ** 2
+    # 10 %: the rate decays within the half second.
+    assert estimate.covariance[2, 2] == pytest.approx(mean * left / (mean + left), rel=0.1)
 
 
 def test_feedback_is_averaged_and_else_the_commands_hold() -> None:

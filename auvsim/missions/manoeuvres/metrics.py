@@ -125,7 +125,7 @@ def parts(log: VehicleLog) -> list[laws.Part]:
 
 
 def manoeuvre_metrics(log: VehicleLog) -> dict[str, Any]:
-    """Values of COLUMNS, each from the first manoeuvre of a sequence that has it, and the figures of every manoeuvre."""
+    """Values of COLUMNS, each from the first manoeuvre of a sequence that has it, and the figures of every one."""
     found = figures(log)
     numbers = {key: next((f.numbers[key] for f in found if key in f.numbers), None) for key in NUMBERS}
     end = float(log["mission"]["time"].max(initial=0.0))
