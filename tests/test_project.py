@@ -3,9 +3,11 @@
 import os
 import re
 import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
+import pytest
 import yaml
 
 import auvsim
@@ -77,3 +79,18 @@ def test_the_plan_in_the_documentation_is_a_plan():
     found = plan.parse(yaml.safe_load(text))
     assert len(found.cells) == 3
     assert found.variants == ("ekf", "imm")
+
+
+def test_import_of_the_package_is_light_and_offers_the_names_of_a_first_cell() -> None:
+    """`import auvsim` imports neither NumPy nor MuJoCo, and the names are the functions themselves."""
+    check = "import auvsim, sys; print({'numpy', 'mujoco', 'numba'} & {*sys.modules}, auvsim.read_log.__module__)"
+    printed = subprocess.run([sys.executable, "-c", check], capture_output=True, text=True, check=True).stdout
+    assert printed.split() == ["set()", "auvsim.data.log"]
+
+    from auvsim.analysis.summary import summarise
+    from auvsim.simulation.loading import load_scenario
+    from auvsim.simulation.run import run
+
+    assert (auvsim.run, auvsim.load_scenario, auvsim.summarise) == (run, load_scenario, summarise)
+    with pytest.raises(AttributeError, match="it offers run, load_scenario, read_log, summarise"):
+        auvsim.nothing  # noqa: B018

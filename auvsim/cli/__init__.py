@@ -272,8 +272,9 @@ def _run(arguments: list[str]) -> int:
 
     if isinstance(command, Run):
         from auvsim.cli import options, run
+        from auvsim.simulation.loading import find
 
-        path = run.find(command.scenario)
+        path = find(command.scenario)
         scenario = options.scenario(path, None, values, command.seed, command.trial)
         return run.run(
             scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
