@@ -143,5 +143,5 @@ for model in ("condense", "lake.yaml"):
     print(f"{model:<10} docked: {summary.docked}, position of the estimate {rms:.2f} m rms")
 
 # %% [markdown]
-# One trial proves nothing, and the condensed model is good: `python -m auvsim.studies.identified_docking lake.yaml` runs a hundred with each model, and with a
+# One trial proves nothing, and the condensed model is good: `auvsim study identified_docking lake.yaml` runs a hundred with each model, and with a
 # third one that is wrong by a fifth.

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from auvsim.analysis.statistics import wilson
 from auvsim.base.errors import InputError
 from auvsim.campaign import design, table, trials
 from auvsim.campaign.folder import Folder, Record, claimed
 from auvsim.campaign.local import Death, Pool
 from auvsim.campaign.plan import Plan
 from auvsim.campaign.task import Result, Task
-from auvsim.missions.docking.metrics import wilson
 
 PREPARATION = 600.0  # in which everything must be set up and compiled once [s]
 

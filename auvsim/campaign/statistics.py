@@ -1,24 +1,19 @@
 """What a campaign comes to: success rates, paired differences between variants, consistency of the estimators."""
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from auvsim.base.frames import Array
-from auvsim.base.randomness import stream
+from auvsim.analysis.statistics import bootstrap, newcombe, wilson
 from auvsim.campaign.table import UNDER_WAY
-from auvsim.missions.docking.metrics import wilson
 from estimators.core.consistency import interval
 
 Row = Mapping[str, Any]  # of the table
 
 RATES = ("docked", "docked_first")
 MEANS = ("miss_distance", "position_rms", "current_rms", "nees_per_dof", "contact_impulse", "time")
-RESAMPLES = 10_000
 CONFIDENCE = 0.95
 
 
@@ -79,8 +74,8 @@ def rates(rows: Sequence[Row], variants: Sequence[str]) -> list[Rate]:
 def differences(rows: Sequence[Row], variants: Sequence[str]) -> list[Difference]:
     """Each variant less the first, over the trials in which both have the quantity; nothing where none has.
 
-    Means have percentile bootstrap intervals over the pairs (Efron & Tibshirani 1993, ch. 13). Rates have Newcombe's
-    (1998), since a bootstrap of pairs that are all alike would claim to be certain.
+    Means have BCa bootstrap intervals over the pairs (Efron 1987). Rates have Newcombe's (1998), since a
+    bootstrap of pairs that are all alike would claim to be certain.
     """
     by_variant = {name: {row["trial"]: row for row in rows if row["variant"] == name} for name in variants}
     reference, *others = by_variant
@@ -93,7 +88,7 @@ def differences(rows: Sequence[Row], variants: Sequence[str]) -> list[Difference
             values = values[np.isfinite(values).all(axis=1)]
             if len(values):
                 less = values[:, 0] - values[:, 1]
-                low, high = _paired_rates(values > 0.5) if quantity in RATES else bootstrap(less)
+                low, high = newcombe(values > 0.5, CONFIDENCE) if quantity in RATES else bootstrap(less, CONFIDENCE)
                 counted = {"value": float(less.mean()), "low": low, "high": high, "pairs": len(less)}
                 found.append(Difference(variant=variant, quantity=quantity, **counted))
     return found
@@ -116,38 +111,3 @@ def consistency(rows: Sequence[Row], variants: Sequence[str]) -> list[Nees]:
                 mean = float(np.mean(values))
                 found.append(Nees(variant=variant, phase=phase, mean=mean, low=low, high=high, trials=len(values)))
     return found
-
-
-def bootstrap(values: Array) -> tuple[float, float]:
-    """Percentile interval of the mean of independent values (n,), the same each time."""
-    generator, n = stream(0, 0, "bootstrap"), len(values)
-    together = max(1, 2_000_000 // n)  # resamples in memory at a time
-    counts = [min(together, RESAMPLES - start) for start in range(0, RESAMPLES, together)]
-    means = [values[generator.integers(n, size=(count, n))].mean(axis=1) for count in counts]
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail])
-    return float(low), float(high)
-
-
-def _paired_rates(pairs: NDArray[np.bool_]) -> tuple[float, float]:
-    """Interval of the difference of two paired success rates (Newcombe 1998, Stat. Med. 17:2635, method 10).
-
-    Args:
-        pairs: (n, 2) whether each of the two succeeded.
-    """
-    first, second = pairs[:, 0], pairs[:, 1]
-    n = len(pairs)
-    both, only, other = (int(np.sum(x)) for x in (first & second, first & ~second, ~first & second))
-    neither = n - both - only - other
-    p, q = (both + only) / n, (both + other) / n
-    (p_low, p_high), (q_low, q_high) = wilson(both + only, n, CONFIDENCE), wilson(both + other, n, CONFIDENCE)
-    product = (both + only) * (other + neither) * (both + other) * (only + neither)
-    excess = both * neither - only * other
-    if excess > 0:  # his continuity correction
-        excess = max(excess - n / 2.0, 0.0)
-    phi = excess / math.sqrt(product) if product else 0.0
-
-    def reach(a: float, b: float) -> float:
-        return math.sqrt(max(a * a - 2.0 * phi * a * b + b * b, 0.0))
-
-    return p - q - reach(p - p_low, q_high - q), p - q + reach(p_high - p, q - q_low)

@@ -1,7 +1,5 @@
 """The command `auvsim`."""
 
-import contextlib
-import io
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +11,7 @@ import tyro
 
 from auvsim import __version__
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.cli.parsing import parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
 
@@ -184,6 +183,11 @@ class Identify:
     """Some of least-squares, segments, prediction-error; by default all."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Runs a study behind the figures of the README; without a name lists them."""
+
+
 Command = (
     Dock
     | Campaign
@@ -194,6 +198,7 @@ Command = (
     | Plot
     | Metrics
     | Reproduce
+    | Study
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
 TAKE_SCENARIO_KEYS = {"dock": Dock, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
@@ -219,12 +224,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    if arguments[:1] == ["study"]:  # each study has options of its own
+        from auvsim.cli import study
+
+        return study.run(arguments[1:])
     values: dict = {}
     if arguments and arguments[0] in TAKE_SCENARIO_KEYS and not {"-h", "--help"} & set(arguments):
         from auvsim.cli import options
 
         arguments, values = options.split(arguments, TAKE_SCENARIO_KEYS[arguments[0]])
-    command = _parse(arguments)
+    command: Command = parse(Command, arguments, "auvsim", _DESCRIPTION)
     if isinstance(command, ScenarioText):
         from auvsim.cli import options
 
@@ -287,22 +296,10 @@ def _run(arguments: list[str]) -> int:
             )
         case Plot():
             return products.again(command.log, products.plots)
+        case Study():
+            raise AssertionError("handled above")
         case Metrics():
             return products.again(command.log, products.show_summary)
-
-
-def _parse(arguments: list[str]) -> Command:
-    """The command that the arguments name; tyro's boxed complaint becomes one line."""
-    complaint = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(complaint):
-            return tyro.cli(Command, prog="auvsim", args=arguments, description=_DESCRIPTION)  # pyright: ignore
-    except SystemExit as leave:
-        if not leave.code:
-            raise
-        lines = [line.strip("│ ") for line in complaint.getvalue().splitlines()[1:]]
-        rule = next((index for index, line in enumerate(lines) if line.startswith("─")), len(lines))
-        raise InputError(f"{' '.join(lines[:rule]).rstrip('.')}; see auvsim --help") from None
 
 
 _DESCRIPTION = "Closed-loop docking trials of autonomous underwater vehicles. `auvsim --version` prints the version."

@@ -4,9 +4,9 @@ import math
 
 import numpy as np
 
+from auvsim.analysis.statistics import wilson
 from auvsim.campaign.report import Content
 from auvsim.campaign.statistics import Difference, Nees, Rate
-from auvsim.missions.docking.metrics import wilson
 
 VARIANTS = ("careful", "<b>bold</b>")  # a name may hold anything
 TRIALS = 60

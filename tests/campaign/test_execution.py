@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from auvsim.analysis.statistics import wilson
 from auvsim.campaign import execution, table
 from auvsim.campaign.folder import Folder, open_folder
 from auvsim.campaign.local import Pool
 from auvsim.campaign.plan import Plan
-from auvsim.missions.docking.metrics import wilson
 
 Planned = Callable[..., Plan]
 AGAIN = "; it had not finished the first time either"

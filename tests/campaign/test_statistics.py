@@ -1,11 +1,10 @@
 """What a campaign comes to: published intervals, coverage over many made-up campaigns, pairs by hand."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy import stats
 
+from auvsim.analysis.statistics import wilson
 from auvsim.campaign import statistics
 from auvsim.campaign.statistics import MEANS, RATES
 from auvsim.campaign.table import COLUMNS, UNDER_WAY
@@ -45,7 +44,7 @@ def test_equal_pairs_are_not_certain() -> None:
     rows = [row(name, k, docked=True) for k in range(200) for name in ("a", "b")]
     found = next(d for d in statistics.differences(rows, ("a", "b")) if d.quantity == "docked")
     assert found.value == 0.0
-    reach = 1.0 - statistics.wilson(200, 200)[0]
+    reach = 1.0 - wilson(200, 200)[0]
     assert (found.low, found.high) == pytest.approx((-reach, reach))
 
 
@@ -60,24 +59,6 @@ def test_differences_are_of_pairs() -> None:
     assert (less.value, less.low, less.high, less.pairs) == (0.5, 0.5, 0.5, 3)
     assert found["docked"].pairs == 4
     assert statistics.differences(rows[:4], ("a",)) == []
-
-
-def test_bootstrap_covers_the_mean() -> None:
-    """95 % intervals of skewed samples of 60: the percentile method covers a little less than it says."""
-    generator = np.random.default_rng(3)
-    samples = generator.exponential(size=(300, 60))
-    inside = [low <= 1.0 <= high for low, high in map(statistics.bootstrap, samples)]
-    # 0.93 is what this method has at n = 60 for this law; four standard deviations of 300 trials.
-    assert np.mean(inside) == pytest.approx(0.93, abs=4 * math.sqrt(0.93 * 0.07 / 300))
-    assert statistics.bootstrap(samples[0]) == statistics.bootstrap(samples[0])
-
-
-def test_bootstrap_of_a_normal_mean() -> None:
-    """As wide as theory has it, within the noise of 10 000 resamples (1 % of the width) and of the sample's own."""
-    values = np.random.default_rng(4).normal(2.0, 3.0, size=400)
-    low, high = statistics.bootstrap(values)
-    reach = 1.96 * values.std() / math.sqrt(400)
-    assert (low, high) == pytest.approx((values.mean() - reach, values.mean() + reach), abs=0.05 * reach)
 
 
 def test_rates_are_wilsons() -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from synthetic import ATTRIBUTES, DOCK_HEADING, GO_AROUND, NOSE, empty_log, from_dock, trial_log, truth, writer
 
-from auvsim.base.errors import InputError
 from auvsim.base.frames import rotation
 from auvsim.base.reading import Reading
 from auvsim.data.log import PHASES, TrialLog
@@ -19,7 +18,6 @@ from auvsim.missions.docking.metrics import (
     fixes,
     phase_at,
     summarise,
-    wilson,
 )
 
 SPEED = 1.5  # along the dock axis [m/s]
@@ -258,26 +256,3 @@ def test_summaries_are_strict_json():
     assert values["real_time_factor"] is None  # no wall time was given
     assert values["estimate"]["all"]["position_rms"] is None
     json.dumps(values, allow_nan=False)
-
-
-@pytest.mark.parametrize(
-    ("successes", "trials", "low", "high"),
-    # Newcombe 1998, table I, method 3 (score without continuity correction), 95 %.
-    [(81, 263, 0.2553, 0.3662), (15, 148, 0.0624, 0.1605), (0, 20, 0.0000, 0.1611), (1, 29, 0.0061, 0.1718)],
-)
-def test_wilson_against_published_intervals(successes: int, trials: int, low: float, high: float):
-    assert wilson(successes, trials) == pytest.approx((low, high), abs=5e-5)  # printed to four digits
-
-
-def test_wilson_bounds_are_where_the_score_test_turns():
-    # By definition each bound p solves |successes/n - p| = z sqrt(p (1 - p) / n).
-    for bound in wilson(37, 50, 0.9):
-        assert abs(37 / 50 - bound) == pytest.approx(1.6448536 * math.sqrt(bound * (1 - bound) / 50), abs=1e-8)
-    assert wilson(0, 0) == (0.0, 1.0)
-    assert wilson(50, 50)[1] == 1.0
-
-
-@pytest.mark.parametrize(("successes", "trials", "confidence"), [(-1, 3, 0.95), (4, 3, 0.95), (1, 3, 1.0)])
-def test_wilson_refuses_impossible_counts(successes: int, trials: int, confidence: float):
-    with pytest.raises(InputError, match="successes"):
-        wilson(successes, trials, confidence)

@@ -6,7 +6,7 @@ import math
 import pytest
 from rich.console import Console
 
-from auvsim.studies.docking import LATER, Study, main, run_study, table
+from auvsim.studies.docking import LATER, Options, Study, report, run_study, table
 
 SEED = 7  # not among those used for tuning
 
@@ -55,14 +55,21 @@ def test_table_and_reasons(study: Study) -> None:
         assert text.count(name) == 1
 
 
-def test_failures_carry_their_reason(capsys: pytest.CaptureFixture) -> None:
+def test_failures_carry_their_reason() -> None:
     """A trial that cannot dock in the time is counted and explained."""
-    late = run_study(2, SEED, {"duration": 20.0}, workers=1)
+    late = run_study(2, SEED, {"duration": 20.0}, jobs=1)
     assert late.docked_within(LATER) == 0
     assert late.failures() == [f"trial {n}: timeout: not docked within 20 s" for n in (0, 1)]
     assert math.isnan(late.estimate_rms("position_rms", "final"))  # it never came so far
-    main(["--trials", "0"])
-    assert "0 of 0" in capsys.readouterr().out
+
+
+def test_a_study_without_trials() -> None:
+    """No rate, no failure."""
+    shown, line = report(Options(trials=0))
+    output = io.StringIO()
+    Console(width=120, file=output).print(shown)
+    assert "0 of 0" in output.getvalue()
+    assert line == "no trial failed"
 
 
 @pytest.mark.slow

@@ -7,9 +7,10 @@ from functools import partial
 
 import numpy as np
 
+from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.navigation import navigator as navigation
 from auvsim.navigation.navigator import Navigator
-from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks, score_tasks, scores
+from auvsim.reproduce.paired import results, run_seed, score_tasks, scores
 from auvsim.reproduce.paper1.mujoco_runs import Recording, RunConditions, simulate, track
 from auvsim.reproduce.paper1.runs import TICK
 from auvsim.reproduce.paper1.study import AFTER, FILTERS, Result, Row, Score

@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks, score_tasks, scores
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.reproduce.paired import results, run_seed, score_tasks, scores
 from auvsim.reproduce.paper1.runs import Conditions, in_order, simulate, track
 from auvsim.reproduce.paper1.study import FILTERS, ROWS, Result, Row, Score
 from auvsim.reproduce.paper1.yardsticks import batch_and_filter, bound
