@@ -1,0 +1,62 @@
+"""The part of each golden log that is kept in `logs/`; `python -m tests.golden.stored` runs the cases and writes it."""
+
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .cases import CASES, HERE, run
+from .compare import Contents, load, old_form
+
+# Every how many rows of a variable are kept.
+KEPT = {
+    "truth/time": 20,
+    "truth/position": 20,
+    "truth/attitude": 20,
+    "truth/nu": 20,
+    "truth/fins": 20,
+    "estimate/time": 4,
+    "estimate/position": 4,
+    "estimate/heading": 4,
+    "estimate/velocity": 4,
+    "estimate/current": 4,
+    "estimate/refused": 1,
+    "guidance/phase": 1,
+    "guidance/attempt": 1,
+    "guidance/heading_command": 20,
+    "command/rudder": 20,
+    "command/elevator": 20,
+    "command/shaft_speed": 20,
+    "compass/value": 40,
+    "usbl/received": 1,
+    "usbl/value": 1,
+    "usbl/outlier": 1,
+    "dvl/value": 10,
+    "gyro/value": 20,
+    "contact/impulse": 20,
+    "event/time": 1,
+    "event/kind": 1,
+}
+VARIANCES = "estimate/variances"  # the diagonal of each fourth covariance
+
+
+def part(contents: Contents) -> dict[str, Any]:
+    """What is kept of a log, under the names of format 2."""
+    whole = old_form(contents)
+    kept = {path: whole[path][::step] for path, step in KEPT.items()}
+    kept["event/kind"] = kept["event/kind"].astype(str)  # objects would be pickled
+    return kept | {VARIANCES: np.diagonal(whole["estimate/covariance"][::4], axis1=1, axis2=2)}
+
+
+def read(name: str) -> dict[str, Any]:
+    """What is kept of a case."""
+    with np.load(HERE / "logs" / f"{name}.npz") as file:
+        return dict(file)
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as folder:
+        for name, case in CASES.items():
+            run(case, Path(folder, "log.nc"))
+            np.savez_compressed(HERE / "logs" / f"{name}.npz", **part(load(Path(folder, "log.nc"))))
