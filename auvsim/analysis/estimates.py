@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvsim.base.frames import Array, wrap
-from auvsim.data.log import VehicleLog
+from auvsim.data.log import StructureLog, VehicleLog
 from auvsim.data.phases import interpolate, phase_at
 from auvsim.missions.docking.dock_frame import to_body
 from estimators.core.consistency import chi_square, interval, normalised_square
@@ -105,11 +105,20 @@ def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
     if "usbl" not in log:
         return np.empty((0, 2))
-    origin = log.log.structure(str(log.attributes["usbl_structure"])).position[:2]
+    origin = usbl_dock(log).position[:2]
     transceiver = [log.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down")]
     packets = log["usbl"]["value"]
     places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) + origin for packet in packets]
     return np.array(places, dtype=float).reshape(len(packets), 2)
+
+
+def usbl_dock(log: VehicleLog) -> StructureLog:
+    """The structure whose USBL serves a vehicle.
+
+    Raises:
+        InputError: the log names none.
+    """
+    return log.log.structure(str(log.attributes.get("usbl_structure") or log.attributes.get("dock", "")))
 
 
 def _rms(errors: Array) -> float | None:

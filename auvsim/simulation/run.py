@@ -14,6 +14,7 @@ from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
 from auvsim.base import yaml_text
 from auvsim.base.errors import DivergenceError
+from auvsim.base.frames import Array
 from auvsim.base.randomness import stream
 from auvsim.base.reading import Reading
 from auvsim.data.log import Log
@@ -141,12 +142,11 @@ class Simulation:
         self.progress_ticks = round(6.0 * rates.control)
         self._listeners = listeners(self.world.current)
         self.ticks = 0
-        for agent in self.agents:
-            start = scenario.vehicles[agent.name].start
-            place = np.array(scenario.start_position(agent.name))
-            channels = agent.vehicle.actuation.allocate(agent.commands)
-            self.world.place(agent.name, place, math.radians(start.heading_deg), start.speed, channels)
-        self.truths: dict[str, Truth] = {agent.name: self.world.truth(agent.name) for agent in self.agents}
+        self.truths: dict[str, Truth] = {}
+        for name, settings in scenario.vehicles.items():
+            start = settings.start
+            place = np.array(scenario.start_position(name))
+            self.place(name, place, math.radians(start.heading_deg), start.speed)
         self.log = self._recorder(seed, trial, path) if record else Unrecorded()
         self._record_truths()
 
@@ -159,6 +159,20 @@ class Simulation:
     def over(self) -> bool:
         """Whether every vehicle has come to the end of its mission."""
         return all(agent.over for agent in self.agents)
+
+    def place(self, name: str, position: Array, heading: float, speed: float) -> None:
+        """Puts a vehicle at another start, before the first step; its actuators already do what is demanded.
+
+        Args:
+            name: of the vehicle.
+            position: (3,) NED [m].
+            heading: [rad].
+            speed: through the water [m/s].
+        """
+        agent = next(agent for agent in self.agents if agent.name == name)
+        channels = agent.vehicle.actuation.allocate(agent.commands)
+        self.world.place(name, position, heading, speed, channels)
+        self.truths[name] = self.world.truth(name)
 
     def step(self) -> None:
         """One control period: physics, sensors, network, estimators, missions, control.

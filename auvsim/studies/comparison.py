@@ -12,7 +12,7 @@ from rich.table import Table
 
 from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.missions.docking.metrics import Summary
+from auvsim.studies.trials import Summary
 from auvsim.navigation.navigator import FACTORIES
 from auvsim.studies.trials import docking_trial
 

@@ -1,13 +1,40 @@
 """Docking trials and manoeuvres that studies run."""
 
+import dataclasses
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from auvsim.analysis.estimates import EstimateQuality
+from auvsim.analysis.summary import summarise
 from auvsim.data import log
-from auvsim.missions.docking.metrics import Summary, summarise
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.simulation.run import run
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Summary:
+    """What studies read of the summary of a docking trial, see `analysis.summary`."""
+
+    docked: bool
+    failure_reason: str | None
+    failure_text: str | None
+    attempts: int
+    time: float  # [s]
+    miss_distance: float | None  # [m]
+    heading_error_deg: float | None
+    contact_impulse: float  # [N s]
+    peak_contact_force: float  # [N]
+    estimate: dict[str, EstimateQuality]  # over all phases ("all") and by phase
+    real_time_factor: float | None
+
+    @classmethod
+    def of(cls, values: Mapping[str, Any]) -> "Summary":
+        """The summary of plain values."""
+        kept = {field.name: values[field.name] for field in dataclasses.fields(cls)}
+        estimate = {phase: EstimateQuality(**quality) for phase, quality in values["estimate"].items()}
+        return cls(**{**kept, "estimate": estimate})
 
 
 def docking_trial(seed: int, trial: int, *pinned: Mapping[str, Any]) -> Summary:
@@ -21,7 +48,8 @@ def docking_trial(seed: int, trial: int, *pinned: Mapping[str, Any]) -> Summary:
     plan = sampling.default_plan()
     for values in pinned:
         plan = sampling.merge(plan, values)
-    return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
+    found = run(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial)
+    return Summary.of(summarise(found.vehicle()))
 
 
 def record_manoeuvre(kind: str, seed: int, path: Path, pinned: Mapping[str, Any]) -> None:
@@ -34,4 +62,4 @@ def record_manoeuvre(kind: str, seed: int, path: Path, pinned: Mapping[str, Any]
         pinned: Nested values on top of the manoeuvre's plan.
     """
     plan = sampling.merge(sampling.manoeuvre_plan(kind), pinned)
-    log.write(run_trial(scenario.parse(sampling.draw(plan, seed, 0)), seed=seed, trial=0), path)
+    log.write(run(scenario.parse(sampling.draw(plan, seed, 0)), seed=seed), path)

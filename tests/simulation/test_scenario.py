@@ -50,7 +50,7 @@ def message(values: dict, **places: str) -> str:
         (
             "current",
             {"speed": 0.2},
-            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, sum",
+            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, waves, grid, sum",
         ),
         ("current.kind", "unifrm", None),
         ("current.terms", None, None),
@@ -61,7 +61,10 @@ def test_bad_values_are_named(key: str, value: object, text: str | None) -> None
     found = message(nested(key, value))
     if text is None:
         assert found.startswith("current: ")
-        assert "there are none, uniform, turning, approach_turn, shear, gust, sum" in found
+        assert (
+            "there are none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, waves, grid, sum"
+            in found
+        )
     else:
         assert found.startswith(f"{key}: {text}")
 
