@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from auvsim import log, scenario
 from auvsim.trial import run_trial
+
+from auvsim import log, scenario
 
 HERE = Path(__file__).parent
 START = re.compile(r"(start:.*?\brange: )([0-9.]+)(.*?\bheading_deg: )([-0-9.]+)", re.DOTALL)  # of the vehicle
