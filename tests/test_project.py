@@ -51,7 +51,7 @@ def test_the_printed_log_format_is_the_log_format():
 
 
 def test_the_printed_columns_of_a_campaign_are_its_columns():
-    from auvsim.campaign.table import markdown
+    from auvsim.campaign.columns import markdown
 
     assert (ROOT / "docs" / "campaign_table.md").read_text() == markdown() + "\n"
 

@@ -185,11 +185,18 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Plan:
     settings = _renewed(settings)
     _check_names(settings, places)
     if "vehicles" not in settings.base:  # the short form, of which a file gives only what is to differ
-        whole = sampling.merge(sampling.default_plan(), settings.base)
+        whole = sampling.merge(_default(settings.base), settings.base)
         settings = settings.model_copy(update={"base": whole})
     plan = Plan(settings, places)
     _check_counts(plan)
     return _checked(plan)
+
+
+def _default(base: Mapping) -> dict:
+    """What a short scenario is given on top of: that of `auvsim manoeuvre` for one, else that of `auvsim dock`."""
+    manoeuvre = base.get("manoeuvre")
+    kind = manoeuvre.get("kind") if isinstance(manoeuvre, Mapping) else None
+    return sampling.manoeuvre_plan(kind) if isinstance(kind, str) else sampling.default_plan()
 
 
 def missions(values: Mapping) -> dict[str, str]:

@@ -65,9 +65,9 @@ def rates(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[
     """The success rates of each variant, over the trials in which the question arises for a vehicle."""
     found = []
     for variant in variants:
-        own = _by_trial(rows, variant).values()
+        own = by_trial(rows, variant).values()
         for quantity in layout.rates:
-            answers = [answer for group in own if (answer := _over(all, group, quantity)) is not None]
+            answers = [answer for group in own if (answer := over(all, group, quantity)) is not None]
             low, high = wilson(sum(answers), len(answers), CONFIDENCE)
             counts = {"successes": sum(answers), "trials": len(answers)}
             found.append(Rate(variant=variant, quantity=quantity, **counts, low=low, high=high))
@@ -80,13 +80,13 @@ def differences(rows: Sequence[Row], variants: Sequence[str], layout: Layout) ->
     Means have BCa bootstrap intervals over the pairs (Efron 1987). Rates have Newcombe's (1998), since a
     bootstrap of pairs that are all alike would claim to be certain.
     """
-    reference, *others = (_by_trial(rows, name) for name in variants)
+    reference, *others = (by_trial(rows, name) for name in variants)
     found = []
     for variant, trials in zip(variants[1:], others, strict=True):
         pairs = [(trials[trial], reference[trial]) for trial in sorted(trials.keys() & reference.keys())]
         for quantity in (*layout.rates, *layout.means):
-            over = all if quantity in layout.rates else mean
-            values = np.array([[_over(over, group, quantity) for group in pair] for pair in pairs], dtype=float)
+            combined = all if quantity in layout.rates else mean
+            values = np.array([[over(combined, group, quantity) for group in pair] for pair in pairs], dtype=float)
             values = values.reshape(-1, 2)  # None: NaN
             values = values[np.isfinite(values).all(axis=1)]
             if len(values):
@@ -107,10 +107,10 @@ def consistency(rows: Sequence[Row], variants: Sequence[str], layout: Layout) ->
     """
     found = []
     for variant in variants:
-        own = _by_trial(rows, variant).values()
+        own = by_trial(rows, variant).values()
         for phase in ("all", *layout.phases):
             key = "nees_per_dof" if phase == "all" else f"nees_per_dof_{phase}"
-            values = [value for group in own if (value := _over(mean, group, key)) is not None]
+            values = [value for group in own if (value := over(mean, group, key)) is not None]
             if values:
                 low, high = (end / 2.0 for end in interval(2.0, len(values), CONFIDENCE))
                 average = float(np.mean(values))
@@ -118,7 +118,7 @@ def consistency(rows: Sequence[Row], variants: Sequence[str], layout: Layout) ->
     return found
 
 
-def _by_trial(rows: Iterable[Row], variant: str) -> dict[int, list[Row]]:
+def by_trial(rows: Iterable[Row], variant: str) -> dict[int, list[Row]]:
     """The vehicles of each trial of a variant."""
     found: dict[int, list[Row]] = {}
     for row in rows:
@@ -127,7 +127,7 @@ def _by_trial(rows: Iterable[Row], variant: str) -> dict[int, list[Row]]:
     return found
 
 
-def _over(combined: Callable[[list[Any]], Any], vehicles: Iterable[Row], quantity: str) -> Any:
+def over(combined: Callable[[list[Any]], Any], vehicles: Iterable[Row], quantity: str) -> Any:
     """A quantity of a trial, combined over its vehicles that have it; None if none has."""
     values = [row[quantity] for row in vehicles if row.get(quantity) is not None]
     return combined(values) if values else None

@@ -67,8 +67,11 @@ class Cells:
 
 
 def frames(content: Content) -> list[str]:
-    """Frames in which some trial has a direction."""
-    return [name for name, frame in FRAMES.items() if any(frame.direction(row) is not None for row in content.rows)]
+    """Frames in which some trial has a direction; that of the dock only where a vehicle docks."""
+    possible = {
+        name: frame for name, frame in FRAMES.items() if not frame.reference or "docking" in content.layout.kinds
+    }
+    return [name for name, frame in possible.items() if any(frame.direction(row) is not None for row in content.rows)]
 
 
 def choose(content: Content) -> Cells | None:

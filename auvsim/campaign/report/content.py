@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from auvsim.campaign import folder, statistics, table
-from auvsim.campaign.columns import Layout
+from auvsim.campaign.columns import SUCCESS, Layout
 from auvsim.campaign.statistics import Difference, Nees, Rate
 
 Row = Mapping[str, Any]  # one vehicle of a trial, as `table.rows` gives it; None where there is no value
@@ -38,8 +38,13 @@ class Content:
         return [row for row in self.rows if row["variant"] == variant]
 
     def trials_of(self, variant: str) -> list[Row]:
-        """The trials of a variant, one row for each, which of several vehicles is that of the first."""
-        return list({row["trial"]: row for row in reversed(self.rows_of(variant))}.values())[::-1]
+        """The trials of a variant, one row for each: of several vehicles the first's, with the rates of all of them."""
+        if not self.layout.fleet:
+            return self.rows_of(variant)
+        return [
+            {**vehicles[0], **{quantity: statistics.over(all, vehicles, quantity) for quantity in self.layout.rates}}
+            for vehicles in statistics.by_trial(self.rows, variant).values()
+        ]
 
     def rate(self, variant: str, quantity: str) -> Rate:
         """How often a variant did something: one of the layout's rates."""
@@ -49,6 +54,11 @@ class Content:
 def words(quantity: str) -> str:
     """A column in words."""
     return WORDS.get(quantity, quantity.replace("_", " "))
+
+
+def negated(quantity: str) -> str:
+    """That a column says no, in words."""
+    return "no success" if quantity == SUCCESS else f"not {words(quantity)}"
 
 
 def read(path: Path) -> Content:

@@ -25,7 +25,8 @@ def _errors(content: Content) -> Markup:
         "all",
         *(p for p in content.layout.phases if any(row.get(f"{PREFIX}_{p}") is not None for row in content.rows)),
     ]
-    head = ["position rms [m], median trial", *(right(_words(phase)) for phase in phases)]
+    median = "median of vehicles" if content.layout.fleet else "median trial"
+    head = [f"position rms [m], {median}", *(right(_words(phase)) for phase in phases)]
     rows = []
     for index, name in enumerate(content.variants):
         trials = content.rows_of(name)

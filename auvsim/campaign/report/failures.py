@@ -26,7 +26,11 @@ def section(content: Content) -> Markup:
     rows = [
         _line(content, name, [row for row in failed if kinds_of[id(row)] == name]) for name, _ in counts.most_common()
     ]
-    kinds = table(["failure", right("trials"), *heads, "run again"], rows, aria_label="failures")
+    kinds = table(
+        ["failure", right("vehicles" if content.layout.fleet else "trials"), *heads, "run again"],
+        rows,
+        aria_label="failures",
+    )
     return join([note("Choose a kind to list its trials."), kinds])
 
 

@@ -47,7 +47,7 @@ def _menu(name: str, label: str, options: dict[str, str]) -> Markup:
 def _figure(content: Content, cells: Cells, frame: str, variant: int) -> Markup:
     name = content.variants[variant]
     places: dict[str, list[Row]] = {}
-    for row in content.rows_of(name):
+    for row in content.trials_of(name):
         places.setdefault(cells.place(row, frame), []).append(row)
     parts = [
         _cell(cells, ring, sector, places[f"{ring},{sector}"], frame, (variant, name), content.layout.rates)

@@ -4,7 +4,7 @@ import json
 from dataclasses import dataclass
 
 from auvsim.campaign.report.chart import Scale, colour, interval, interval_scale, ruler
-from auvsim.campaign.report.content import Content, quantile, values, words
+from auvsim.campaign.report.content import Content, negated, quantile, values, words
 from auvsim.campaign.report.markup import Markup, join, note, number, percent, right, table, tag
 from auvsim.campaign.statistics import Difference
 
@@ -49,7 +49,7 @@ def variants_table(content: Content) -> Markup:
     heads = []
     for quantity in content.layout.rates:
         heads += [words(quantity), tag("th", "95 % interval", ruler(scale, 100.0, " %"), scope="col")]
-    heads += map(right, (f"not {words(content.layout.success)}", *_medians(content).values()))
+    heads += map(right, (negated(content.layout.success), *_medians(content).values()))
     rows = [_variant(content, index, name, scale) for index, name in enumerate(content.variants)]
     return table(["variant", *heads], rows, aria_label="success")
 
@@ -66,7 +66,7 @@ def _variant(content: Content, index: int, name: str, scale: Scale) -> Markup:
     success = content.rate(name, content.layout.success)
     key = json.dumps({"v": str(index), "docked": "0"})
     failed = success.trials - success.successes
-    data = {"data_filter": key, "data_label": f"{name}, not {words(success.quantity)}"}
+    data = {"data_filter": key, "data_label": f"{name}, {negated(success.quantity)}"}
     cells.append(tag("td", tag("button", failed, class_="plain", type="button", **data), class_="n"))
     trials = content.rows_of(name)
     cells += [tag("td", number(quantile(values(trials, column), 0.5)), class_="n") for column in _medians(content)]

@@ -6,7 +6,7 @@ from urllib.parse import quote
 from auvsim.campaign.columns import metrics_of
 from auvsim.campaign.report.cells import FRAMES, Cells
 from auvsim.campaign.report.chart import colour
-from auvsim.campaign.report.content import Content, Row, words
+from auvsim.campaign.report.content import Content, Row, negated, words
 from auvsim.campaign.report.markup import Markup, join, number, table, tag
 
 COLUMNS = {  # column: heading
@@ -26,7 +26,7 @@ def kind(row: Row, success: str) -> str:
     if row["failure"] == "error":
         return f"error: {row['error_type']}"
     if row[success] or row["failure"] is None:
-        return f"not {words(success)}" if row[success] is False else words(success)
+        return negated(success) if row[success] is False else words(success)
     return str(row["failure"])
 
 

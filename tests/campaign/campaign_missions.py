@@ -1,0 +1,64 @@
+"""Missions of one's own in campaigns."""
+
+import numpy as np
+
+from auvsim.control.controller import Setpoints
+from auvsim.missions.mission import Metric, Mission
+
+
+class Wait(Mission):
+    """Holds depth and heading for some time."""
+
+    phases = ("begin", "end")
+    columns = {
+        "calm": Metric("bool", "1", "whether it stayed within a metre of its depth"),
+        "deepest": Metric("float", "m", "largest depth"),
+        "halves": Metric("int", "1", "halves of the time that have begun"),
+        "mood": Metric("str", "", "in words"),
+    }
+
+    def __init__(self, setup) -> None:
+        super().__init__(setup)
+        self._heading, self._depth, self._time = setup.heading, setup.depth, setup.settings["time"]
+
+    def update(self, now):
+        """As at the start."""
+        self.phase = int(now.time > self._time / 2.0)
+        self.finished = now.time >= self._time
+        return Setpoints(self._heading, self._depth, 1.0)
+
+    @classmethod
+    def metrics(cls, log):
+        """From the truth, as NumPy has them."""
+        depth = log["truth"]["position"][:, 2]
+        calm = bool(np.ptp(depth) < 1.0)
+        return {
+            "calm": calm,
+            "deepest": float(depth.max()),
+            "halves": 1 + int(log["mission"]["phase"][-1]),
+            "mood": "good",
+        }
+
+
+class Vague(Wait):
+    """Gives a text for a number."""
+
+    @classmethod
+    def metrics(cls, log):
+        """With the wrong type."""
+        return {**super().metrics(log), "deepest": "deep"}
+
+
+class Silent(Wait):
+    """Fails where it is to say how it was."""
+
+    @classmethod
+    def metrics(cls, log):
+        """Raises."""
+        raise KeyError("no such group")
+
+
+class Clashing(Wait):
+    """Declares a column that every table has."""
+
+    columns = {"trial": Metric("int", "1", "of patience")}
