@@ -33,6 +33,7 @@ OUTCOME: Columns = {
     "time": Metric("float", "s", "of the end"),
 }
 RENAMED = {"failure_reason": "failure"}  # metrics that the table calls otherwise, since it has more to say there
+SAID = ("failure", "failure_text")  # of which the table says what it means, whatever the mission says
 QUALITIES: Columns = {
     "samples": Metric("int", "1", "estimates, since the first fix"),
     "position_rms": Metric("float", "m", "error of the estimated horizontal position, rms"),
@@ -81,7 +82,7 @@ def layout(kinds: Sequence[str], fleet: bool = False, criterion: Criterion | Non
     """
     own = _of_missions(kinds)
     phases = tuple(dict.fromkeys(phase for kind in kinds for phase in phases_of(kind)))
-    told = {name: OUTCOME["failure"] if name == "failure" else column for name, column in own.items()}
+    told = {name: OUTCOME[name] if name in SAID else column for name, column in own.items()}
     told |= {name: column for name, column in OUTCOME.items() if name not in own}
     told |= QUALITIES | {
         f"{name}_{phase}": Metric(column.dtype, column.units, f"{column.meaning}; phase {phase}")

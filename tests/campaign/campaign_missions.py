@@ -1,5 +1,7 @@
 """Missions of one's own in campaigns."""
 
+from typing import ClassVar
+
 import numpy as np
 
 from auvsim.control.controller import Setpoints
@@ -10,7 +12,7 @@ class Wait(Mission):
     """Holds depth and heading for some time."""
 
     phases = ("begin", "end")
-    columns = {
+    columns: ClassVar = {
         "calm": Metric("bool", "1", "whether it stayed within a metre of its depth"),
         "deepest": Metric("float", "m", "largest depth"),
         "halves": Metric("int", "1", "halves of the time that have begun"),
@@ -61,4 +63,4 @@ class Silent(Wait):
 class Clashing(Wait):
     """Declares a column that every table has."""
 
-    columns = {"trial": Metric("int", "1", "of patience")}
+    columns: ClassVar = {"trial": Metric("int", "1", "of patience")}

@@ -222,7 +222,7 @@ def test_what_counts_as_success() -> None:
         ("finished", None),
         (None, True),
     ):
-        assert columns.judged("docking", values and criterion(values), row) is expected, values
+        assert columns.judged("docking", None if values is None else criterion(values), row) is expected, values
     assert columns.judged("manoeuvre", None, {"failure": None})
     assert not columns.judged("manoeuvre", None, {"failure": "error"})
     assert columns.judged("track", None, {"finished": False, "failure": None}) is False
