@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,10 +11,12 @@ from auvsim.base.frames import Array, wrap
 from auvsim.data.log import StructureLog, VehicleLog
 from auvsim.data.phases import interpolate, phase_at
 from auvsim.missions.docking.dock_frame import to_body
+from auvsim.navigation.estimate import PLANAR_STATES
 from estimators.core.consistency import chi_square, interval, normalised_square
-from estimators.docking.usbl import horizontal_rotation
+from estimators.docking.usbl import UsblFix, UsblModel
 
 NEES_INTERVAL = interval(2)  # 95 % of the NEES of a horizontal position
+NOT_STARTED, DUPLICATE = "not_started", "duplicate"  # reasons for which readings are refused, see `core.history`
 AT_REST = "docked"  # phase in which the vehicle no longer moves as any model of free motion says
 
 
@@ -28,7 +31,7 @@ class EstimateErrors:
     heading: Array  # (n,) wrapped [rad]
     velocity: Array  # (n, 3) u, v through the water [m/s], r [rad/s]
     current: Array  # (n, 2) north, east [m/s]
-    sigma: Array  # (n, k) claimed standard deviations, of planar states of north, east, heading, u, v, r, current; 0 where not estimated
+    sigma: Array  # (n, 8) claimed standard deviations of PLANAR_STATES; 0 where not estimated
     nees: Array  # (n,) of the horizontal position, 2 degrees of freedom; NaN where the covariance is singular
 
 
@@ -66,7 +69,7 @@ def estimate_errors(log: VehicleLog) -> EstimateErrors:
         heading=np.array([wrap(error) for error in (estimate["heading"] - heading).tolist()]),
         velocity=estimate["velocity"] - interpolate(time, truth["time"], through_water),
         current=estimate["current"] - interpolate(time, truth["time"], truth["current"][:, :2]),
-        sigma=np.sqrt(np.maximum(np.diagonal(covariance, axis1=1, axis2=2), 0.0)),
+        sigma=_sigma(log),
         nees=nees,
     )
 
@@ -101,15 +104,50 @@ def estimate_quality(errors: EstimateErrors, phases: tuple[str, ...]) -> dict[st
     return qualities
 
 
+def _sigma(log: VehicleLog) -> Array:
+    """Claimed standard deviations (n, 8) of the planar states, by their names among those of the estimate."""
+    variances = np.diagonal(log["estimate"]["covariance"], axis1=1, axis2=2)
+    names = log.table("estimate")["mean"].labels
+    sigma = np.zeros((len(variances), len(PLANAR_STATES)))
+    for column, name in enumerate(PLANAR_STATES):
+        if name in names:
+            sigma[:, column] = np.sqrt(np.maximum(variances[:, names.index(name)], 0.0))
+    return sigma
+
+
+def refusals(log: VehicleLog) -> tuple[Array, tuple[str, ...]]:
+    """When the estimator refused readings (k,) [s], and the reasons that occur; none where the log does not say.
+
+    What came before it had started is not counted.
+    """
+    decided = log["measurements"]
+    refused = ~decided["accepted"] & (decided["reason"] != NOT_STARTED)
+    return decided["time"][refused], tuple(sorted({*decided["reason"][refused].tolist()}))
+
+
+def fix_fates(log: VehicleLog) -> NDArray[Any]:
+    """Why the estimator refused each USBL packet, as text (n,); empty where it did not, or the log does not say.
+
+    The last decision counts: a late packet may undo an earlier one. A second copy is not the packet that it repeats.
+    """
+    if "usbl" not in log:
+        return np.empty(0, dtype=object)
+    decided = log["measurements"]
+    of_fixes = (decided["sensor"] == "usbl") & (decided["reason"] != DUPLICATE)
+    last = dict(zip(decided["sequence"][of_fixes].tolist(), decided["reason"][of_fixes].tolist(), strict=True))
+    return np.array([last.get(number, "") for number in log["usbl"]["sequence"].tolist()], dtype=object)
+
+
 def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
     if "usbl" not in log:
         return np.empty((0, 2))
-    origin = usbl_dock(log).position[:2]
-    transceiver = [log.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down")]
-    packets = log["usbl"]["value"]
-    places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) + origin for packet in packets]
-    return np.array(places, dtype=float).reshape(len(packets), 2)
+    dock = usbl_dock(log)
+    forward, starboard, down = (dock.number(f"transceiver_{a}", 0.0) for a in ("forward", "starboard", "down"))
+    model, packets = UsblModel(transceiver=(forward, starboard, down)), log["usbl"]["value"]
+    found = [UsblFix(stamp=0.0, received=0.0, position=p[:3], heading=p[3], pitch=p[4], roll=p[5]) for p in packets]
+    places = np.array([model.world_fix(fix).value for fix in found], dtype=float).reshape(len(packets), 2)
+    return places + dock.position[:2]
 
 
 def usbl_dock(log: VehicleLog) -> StructureLog:
@@ -125,5 +163,3 @@ def _rms(errors: Array) -> float | None:
     """Root of the mean squared length of error vectors (n, k); those that are not finite do not count."""
     squares = np.square(errors[np.isfinite(errors).all(axis=1)]).sum(axis=1)
     return float(np.sqrt(squares.mean())) if len(squares) else None
-
-

@@ -54,7 +54,7 @@ class Run:
     trial: int = 0
     """Number of the run under that seed."""
     out: Path = Path("out")
-    """Folder of trial.nc, summary.json, track.png, estimates.png and run.mp4."""
+    """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several."""
     video: bool = True
     """Whether to draw run.mp4."""
 

@@ -19,8 +19,8 @@ def is_manoeuvre(log: Log) -> bool:
 
 
 def plots(log: Log, folder: Path) -> None:
-    """Draws track.png and estimates.png; of a manoeuvre one picture of its name."""
-    from auvsim.analysis import manoeuvre_plots, plots
+    """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png."""
+    from auvsim.analysis import fleet_plots, manoeuvre_plots, plots
     from auvsim.missions.manoeuvres import laws
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
@@ -29,9 +29,13 @@ def plots(log: Log, folder: Path) -> None:
         with whole(folder / f"{laws.name(manoeuvre_metrics.settings(vehicle))}.png") as partial:
             manoeuvre_plots.manoeuvre(vehicle, partial)
         return
+    if len(log.vehicles) > 1:
+        with whole(folder / "fleet.png") as partial:
+            fleet_plots.fleet(log, partial)
+        return
     for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
         with whole(folder / name) as partial:
-            draw(log, partial)
+            draw(log.vehicle(), partial)
 
 
 def video_name(log: Log) -> str:
@@ -66,9 +70,8 @@ def still(log: Log, folder: Path, *, path: Path, time: float | None = None, came
 def summary(log: Log, folder: Path) -> dict[str, Any]:
     """Writes summary.json and returns what it holds."""
     from auvsim.analysis.summary import summarise_all
-    from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
-    values = manoeuvre_metrics.summary(log.vehicle()) if is_manoeuvre(log) else summarise_all(log)
+    values = summarise_all(log)
     with whole(folder / "summary.json") as partial:
         partial.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return values

@@ -14,7 +14,7 @@ from auvsim.simulation.scenario import Scenario
 
 SHIPPED = Path(auvsim.__file__).parent / "scenarios"
 LOG = "trial.nc"
-PRODUCTS = ("summary.json", "track.png", "estimates.png", *products.VIDEOS)  # made from it
+PRODUCTS = ("summary.json", "track.png", "estimates.png", "fleet.png", *products.VIDEOS)  # made from it
 COMPILING = "compiling {} (this once; later runs find the code in the cache)"
 WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 

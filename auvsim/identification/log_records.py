@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from auvsim.base.errors import InputError
 from auvsim.analysis.estimates import fixes, usbl_dock
+from auvsim.base.errors import InputError
 from auvsim.data.log import VehicleLog, read
 from auvsim.identification.signals import MARGIN, Signal, Signals, steep, stretches
 from auvsim.missions.manoeuvres import laws as manoeuvres
@@ -95,9 +95,8 @@ def _places(log: VehicleLog, heading: Signal, transponder: tuple[float, float, f
 def _deviations(plan: VehicleSettings, places: Array) -> dict[str, float]:
     """Standard deviations of one reading, as the scenario's data sheets say; places are seen from the dock."""
     sensors = plan.sensors
-    distance = max(float(np.median(np.hypot(*places.T))), 1e-3) if len(places) else 1.0
-    ranges, sds = np.log(np.array(sensors.usbl.noise)).T
-    fix = sensors.usbl.noise_scale * math.exp(float(np.interp(math.log(distance), ranges, sds)))
+    distance = float(np.median(np.hypot(*places.T))) if len(places) else 1.0
+    fix = sensors.usbl.sigma(distance)
     given = {
         "north": fix, "east": fix,
         "heading": math.radians(sensors.compass.heading_noise_deg),

@@ -261,22 +261,12 @@ class Simulation:
         if scenario.datum.latitude is not None and scenario.datum.longitude is not None:
             attributes |= {"latitude": scenario.datum.latitude, "longitude": scenario.datum.longitude}
         of_groups = {f"vehicles/{agent.name}": self._attributes_of(agent) for agent in self.agents}
-        of_groups |= {
-            f"structures/{name}": {"model": settings.model, **self._places[name].structure.dimensions}
-            | {
-                "north": settings.north,
-                "east": settings.east,
-                "depth": settings.depth,
-                "heading": settings.pose.heading,
-            }
-            for name, settings in scenario.structures.items()
-        }
+        of_groups |= {f"structures/{name}": self._attributes_of_structure(name) for name in scenario.structures}
         return Recorder(groups, attributes, of_groups, path)
 
     def _attributes_of(self, agent: Agent) -> dict[str, Any]:
         """What the log says of a vehicle as a whole."""
         settings = self.scenario.vehicles[agent.name]
-        forward, starboard, down = settings.sensors.usbl.transceiver
         return {
             "model": settings.model,
             "nose": agent.vehicle.nose,
@@ -287,9 +277,21 @@ class Simulation:
             "mission_settings": yaml_text.dump(settings.mission.model_dump(mode="json")),
             "dock": agent.mission.dock.name if agent.mission.dock else "",
             "usbl_structure": agent.dock or "",
-            "transceiver_forward": forward,
-            "transceiver_starboard": starboard,
-            "transceiver_down": down,
+        }
+
+    def _attributes_of_structure(self, name: str) -> dict[str, Any]:
+        """What the log says of a structure; its transceiver is that of the first vehicle which it serves."""
+        settings = self.scenario.structures[name]
+        place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
+        served = next((agent.name for agent in self.agents if agent.dock == name), None)
+        transceiver = self.scenario.vehicles[served].sensors.usbl.transceiver if served else ()
+        axes = ("transceiver_forward", "transceiver_starboard", "transceiver_down")
+        return {
+            "model": settings.model,
+            **place,
+            "heading": settings.pose.heading,
+            **self._places[name].structure.dimensions,
+            **dict(zip(axes, transceiver, strict=False)),
         }
 
 

@@ -2,46 +2,19 @@
 
 import math
 from dataclasses import dataclass
-from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
+from dockings import DOCK_DEPTH, LATCHED, MOUTH, NOSE, PERIOD, SETTINGS, new, update
 
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.control.controller import Setpoints
-from auvsim.missions.docking.guidance import CLEAR, Docking, DockingSettings, Phase, approach_course
+from auvsim.missions.docking.guidance import CLEAR, Docking, Phase, approach_course
 from auvsim.missions.line_of_sight import heading_for_course
-from auvsim.missions.mission import MissionSetup, Place, Situation
 from auvsim.navigation.estimate import Estimate
-from auvsim.physics.truth import StructurePose
 
-SETTINGS = DockingSettings()
-NOSE, MOUTH, LATCHED = 0.8, 0.75, 1.3  # of vehicle and dock [m]
-DOCK_DEPTH = 12.0
 LIMIT = math.radians(SETTINGS.heading_limit_deg)
-PERIOD = 0.1  # of control [s]
-
-
-def new(settings: DockingSettings = SETTINGS, north: float = 0.0, east: float = 0.0) -> Docking:
-    """A docking at its beginning; only what guidance knows of vehicle and dock is there."""
-    structure: Any = SimpleNamespace(mouth_radius=MOUTH, latched=LATCHED)
-    vehicle: Any = SimpleNamespace(nose=NOSE)
-    pose = StructurePose(north=north, east=east, depth=DOCK_DEPTH, heading=0.0)
-    setup = MissionSetup(
-        name="auv", settings=settings, vehicle=vehicle, heading=0.0, depth=5.0, period=PERIOD,
-        holds=lambda speed: True, structures={"dock": Place(name="dock", pose=pose, structure=structure)},
-    )  # fmt: skip
-    return Docking(setup)
-
-
-def update(
-    guidance: Docking, time: float, estimate: "Estimate | None", heading: float, depth: float, latched=False, fixes=()
-) -> Setpoints:
-    """One call of a docking."""
-    held = "dock" if latched else None
-    return guidance.update(Situation(time, estimate, heading, depth, held, fixes, ()))
 
 
 def fix(time: float, axis: float = 0.0, depth: float = DOCK_DEPTH) -> Reading:
@@ -182,9 +155,7 @@ def test_phases_of_a_docking_in_their_order() -> None:
     guidance = new()
     held = Setpoints(0.7, 5.0, SETTINGS.approach_speed)
     for time in (0.0, 5.0):  # holds what it had, although the vehicle has turned meanwhile
-        assert update(guidance, time, None, 0.7 + time, 5.0 + time, False) == Setpoints(
-            0.7, 5.0, SETTINGS.approach_speed
-        )
+        assert update(guidance, time, None, 0.7 + time, 5.0 + time, False) == held
     waiting = estimate(5.0, 0.0, 0.0, 0.0, initialised=False)
     update(guidance, 5.0, waiting, 0.0, 5.0, False)
     assert guidance.phase == Phase.SEARCH

@@ -18,6 +18,7 @@ from auvsim.physics.truth import Truth
 from auvsim.sensors.compass import Compass, CompassSettings
 from auvsim.sensors.depth import Depth, DepthSettings
 from auvsim.sensors.feedback import Feedback, FeedbackSettings
+from estimators.docking.usbl import UsblModel
 
 COUNT = 20_000
 DEG = math.pi / 180.0
@@ -181,13 +182,17 @@ def test_interpolation_follows_a_turning_circle():
 
 
 def test_usbl_noise_table():
-    usbl = Usbl(UsblSettings(), source(), DOCK)
+    settings = UsblSettings()
     table = {12.0: 0.0067, 40.0: 0.0678, 100.0: 0.3390, 200.0: 0.4807, 3.0: 0.0067, 0.0: 0.0067, 900.0: 0.4807}
     for slant_range, sigma in table.items():
-        assert usbl.sigma(slant_range) == pytest.approx(sigma, rel=1e-12)
-    middle = usbl.sigma(math.sqrt(40.0 * 100.0))
+        assert settings.sigma(slant_range) == pytest.approx(sigma, rel=1e-12)
+    middle = settings.sigma(math.sqrt(40.0 * 100.0))
     assert middle == pytest.approx(math.sqrt(0.0678 * 0.3390), rel=1e-12)  # geometric means: log-log
-    assert Usbl(UsblSettings(noise=((50.0, 0.1),), noise_scale=3.0), source(), DOCK).sigma(7.0) == pytest.approx(0.3)
+    assert UsblSettings(noise=((50.0, 0.1),), noise_scale=3.0).sigma(7.0) == pytest.approx(0.3)
+    # The estimators' own model of the sensor has the same table and interpolation by default.
+    assert [UsblModel().deviation(r) for r in (3.0, 50.0, 150.0, 900.0)] == pytest.approx(
+        [settings.sigma(r) for r in (3.0, 50.0, 150.0, 900.0)], rel=1e-12
+    )
 
 
 def static_pings(settings, position=(-60.0, 0.0, 20.0), until=50_000.0, trial=0, dock=DOCK):
@@ -201,7 +206,7 @@ def test_usbl_noise_is_isotropic_and_white(distance):
     pings = static_pings(UsblSettings(outlier_probability=0.0, transceiver=(0, 0, 0)), position)
     exact = static_pings(UsblSettings(**EXACT, transceiver=(0, 0, 0)), position)
     errors = np.array([p.reading.value[:3] - e.reading.value[:3] for p, e in zip(pings, exact, strict=True)])
-    sigma = Usbl(UsblSettings(), source(), DOCK).sigma(pings[0].slant_range)
+    sigma = UsblSettings().sigma(pings[0].slant_range)
     for axis in range(3):
         assert_sd(errors[:, axis], sigma)
         assert_white(errors[:, axis])

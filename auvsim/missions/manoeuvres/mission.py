@@ -1,10 +1,13 @@
 """A manoeuvre as a mission: rudder and speed in time at a constant depth, from the compass alone."""
 
 import math
+from typing import Any
 
 from auvsim.base.errors import InputError
 from auvsim.control.controller import Setpoints
+from auvsim.data.log import VehicleLog
 from auvsim.missions.manoeuvres import laws
+from auvsim.missions.manoeuvres.metrics import COLUMNS, manoeuvre_metrics
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.missions.mission import Event, Mission, MissionSetup, Situation
 
@@ -18,6 +21,7 @@ class Manoeuvre(Mission):
 
     Settings = ManoeuvreMissionSettings
     phases = ("manoeuvre",)
+    columns = COLUMNS
 
     def __init__(self, setup: MissionSetup) -> None:
         super().__init__(setup)
@@ -38,3 +42,8 @@ class Manoeuvre(Mission):
         self.finished = now.time >= self._steering.duration - 1e-9
         course = order.course if order.rudder is None else math.nan
         return Setpoints(course, self._depth, order.speed, order.rudder)
+
+    @classmethod
+    def metrics(cls, log: VehicleLog) -> dict[str, Any]:
+        """What engineers read off the manoeuvre."""
+        return manoeuvre_metrics(log)

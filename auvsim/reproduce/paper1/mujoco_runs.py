@@ -61,9 +61,7 @@ class RunConditions:
     acoustics: Mapping[str, Any] = field(default_factory=dict)  # of AcousticSettings
     thrust: float = 1.0  # true X_nn over the one that filters assume
     compass_bias: float | None = None  # [rad]; None: drawn, as in trials
-    planar: bool = (
-        False  # truth of the fitted planar model with the planar study's process noise, not MuJoCo's
-    )
+    planar: bool = False  # truth of the fitted planar model with the planar study's process noise, not MuJoCo's
 
 
 class Tick(NamedTuple):
