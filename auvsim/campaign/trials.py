@@ -15,9 +15,9 @@ from auvsim.base.errors import InputError
 from auvsim.campaign import columns
 from auvsim.campaign.criterion import Criterion
 from auvsim.campaign.task import Result, Task
+from auvsim.data.attributes import VERSIONS
 from auvsim.data.log import Log, VehicleLog, pack
 from auvsim.data.recorder import version as installed
-from auvsim.data.variables import VERSIONS
 from auvsim.simulation import scenario
 
 WARM_UP = 30.0  # simulated time in which all is called, and so compiled, that a whole trial calls [s]
