@@ -59,7 +59,11 @@ def test_the_printed_columns_of_a_campaign_are_its_columns():
 def test_the_plan_in_the_documentation_is_a_plan():
     from auvsim.campaign import plan
 
-    text = (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1].split("```")[0]
-    found = plan.parse(yaml.safe_load(text))
+    docking, track = (
+        plan.parse(yaml.safe_load(part.split("```")[0]))
+        for part in (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1:]
+    )
+    assert (docking.layout.success, track.layout.success) == ("docked", "success")
+    found = docking
     assert len(found.cells) == 3
     assert found.variants == ("ekf", "imm")
