@@ -64,6 +64,6 @@ def test_the_plan_in_the_documentation_is_a_plan():
         for part in (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1:]
     )
     assert (docking.layout.success, track.layout.success) == ("docked", "success")
-    found = docking
-    assert len(found.cells) == 3
-    assert found.variants == ("ekf", "imm")
+
+    assert len(docking.cells) == 3
+    assert docking.variants == ("ekf", "imm")

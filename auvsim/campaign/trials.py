@@ -113,14 +113,15 @@ def summarised(log: Log) -> dict[str, Any]:
     Raises:
         InputError: A mission did not give what it declares.
     """
-    summary = summarise_all(log)
+    # As plain values: a user's own mission may give those of NumPy.
+    summary = json.loads(json.dumps(summarise_all(log), default=lambda value: value.item(), allow_nan=False))
     for name in log.vehicles:
         of_vehicle, kind = vehicle_summary(summary, name), log.vehicle(name).mission
         of_vehicle.pop("real_time_factor")
         columns.check(kind, of_vehicle)
         if "failure" not in columns.metrics_of(kind):
             of_vehicle["failure_reason"], of_vehicle["failure_text"] = _failure(log.vehicle(name))
-    return json.loads(json.dumps(summary, allow_nan=False))
+    return summary
 
 
 def vehicle_summary(summary: Mapping[str, Any], vehicle: str) -> dict[str, Any]:

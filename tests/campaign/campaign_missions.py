@@ -33,13 +33,8 @@ class Wait(Mission):
     def metrics(cls, log):
         """From the truth, as NumPy has them."""
         depth = log["truth"]["position"][:, 2]
-        calm = bool(np.ptp(depth) < 1.0)
-        return {
-            "calm": calm,
-            "deepest": float(depth.max()),
-            "halves": 1 + int(log["mission"]["phase"][-1]),
-            "mood": "good",
-        }
+        halves = 1 + log["mission"]["phase"][-1]
+        return {"calm": np.ptp(depth) < 1.0, "deepest": depth.max(), "halves": halves, "mood": "good"}
 
 
 class Vague(Wait):

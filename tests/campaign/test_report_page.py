@@ -235,3 +235,17 @@ def test_scales_hold_their_values_between_round_ticks() -> None:
     assert decades(0.1) == pytest.approx(100.0)
     assert decades.ticks(8) == pytest.approx([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0])
     assert decades.ticks(4) == pytest.approx([0.01, 0.1, 1.0])
+
+
+def test_trials_of_several_vehicles_count_once() -> None:
+    """In the map a trial is one, and a success if it is one for all of its vehicles; its cost counts once."""
+    several = layout(("docking",), True)
+    pairs = [{**each, "vehicle": name} for each in rows() for name in ("left", "right")]
+    for each in pairs:
+        each["docked"] = each["docked"] and (each["vehicle"] == "left" or each["trial"] != 3)
+    made = content(rows=pairs, layout=several)
+    mine = made.trials_of(VARIANTS[0])
+    assert [each["trial"] for each in mine] == list(range(TRIALS))
+    assert [each["trial"] for each in mine if not each["docked"]] == [3]
+    assert facts(made)["trials"] == "120 (2 × 60)"
+    assert re.findall(r"<td[^>]*>([^<]*)</td>", cost.section(made))[0] == "60"
