@@ -18,18 +18,21 @@ def modules(root: Path = ROOT) -> dict[str, str]:
 
 
 def packages(names: Iterable[str]) -> list[str]:
-    """The packages right below auvsim and estimators, in the order in which they may import each other."""
-    found = {".".join(name.split(".")[:2]) for name in names if "." in name}
-    known = [*(f"estimators.{name}" for name in ESTIMATORS), *(f"auvsim.{name}" for name in ORDER)]
+    """The packages auvsim and estimators and those right below them, in the order in which they may import each other."""
+    found = {".".join(name.split(".")[:2]) for name in names if "__main__" not in name}
+    known = ["estimators", *(f"estimators.{name}" for name in ESTIMATORS), "auvsim", *(f"auvsim.{n}" for n in ORDER)]
     return [name for name in known if name in found] + sorted(found - set(known))
 
 
 def markdown(known: dict[str, str]) -> str:
     """A heading with one line for each package, and a table of its modules."""
-    lines = []
-    for package in packages(known):
+    lines, listed = [], packages(known)
+    for package in listed:
         lines += [f"### {package}", "", known[package], ""]
-        lines += _table([name for name in known if name.startswith(f"{package}.")], package, known)
+        inside = [name for name in known if name.startswith(f"{package}.") and name not in listed]
+        if package in ("auvsim", "estimators"):
+            inside = [name for name in inside if name.count(".") == 1]
+        lines += _table(inside, package, known)
     return "\n".join(lines)
 
 
