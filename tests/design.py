@@ -18,7 +18,7 @@ def modules(root: Path = ROOT) -> dict[str, str]:
 
 
 def packages(names: Iterable[str]) -> list[str]:
-    """The packages auvsim and estimators and those right below them, in the order in which they may import each other."""
+    """Packages auvsim and estimators and those right below them, in the order in which they may import each other."""
     found = {".".join(name.split(".")[:2]) for name in names if "__main__" not in name}
     known = ["estimators", *(f"estimators.{name}" for name in ESTIMATORS), "auvsim", *(f"auvsim.{n}" for n in ORDER)]
     return [name for name in known if name in found] + sorted(found - set(known))

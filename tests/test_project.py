@@ -1,5 +1,6 @@
 """What the README, the continuous integration and the version say agrees."""
 
+import ast
 import os
 import re
 import subprocess
@@ -98,3 +99,21 @@ def test_import_of_the_package_is_light_and_offers_the_names_of_a_first_cell() -
     assert (auvsim.run, auvsim.load_scenario, auvsim.summarise) == (run, load_scenario, summarise)
     with pytest.raises(AttributeError, match="it offers run, load_scenario, read_log, summarise"):
         auvsim.nothing  # noqa: B018
+
+
+def test_python_of_the_readme_runs() -> None:
+    """Its example prints the summary of a docking trial, with the names that it says."""
+    (code,) = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    printed = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert ast.literal_eval(printed)["docked"] in (True, False)
+
+
+def test_files_that_the_documentation_links_to_are_there() -> None:
+    """Every relative link of the pages, and every test that the README names beside a figure."""
+    pages = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "models" / "README.md", *(ROOT / "docs").glob("*.md")]
+    for page in pages:
+        text = page.read_text()
+        for link in re.findall(r"\]\(([^)#:]+)\)", text):
+            assert (page.parent / link).exists(), f"{page.name}: {link}"
+        for path in re.findall(r"\btests/[\w/]+\.py", text):
+            assert (ROOT / path).is_file(), f"{page.name}: {path}"
