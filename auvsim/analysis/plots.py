@@ -1,4 +1,4 @@
-"""Pictures of a trial, from its log alone: where it went (track) and what it believed (estimates).
+"""Pictures of a trial, from its log alone: where it went (track) and what was estimated (estimates).
 
 Figures are made without pyplot, so nothing global (backend, style, open figures) is touched.
 """
@@ -115,7 +115,7 @@ def _plan(axes: Axes, log: TrialLog) -> None:
     symbol = np.concatenate([walls[0], walls[1][::-1]])
     axes.plot(0.0, 0.0, marker=symbol, mfc="#f0d9c4", mec=DOCK, ms=26, ls="", label="dock", zorder=2)
     phase_line(axes, log, position[:, 1], position[:, 0])
-    axes.plot(*estimate["position"][_believable(log), 1::-1].T, **ESTIMATE)
+    axes.plot(*estimate["position"][_usable(log), 1::-1].T, **ESTIMATE)
     axes.plot(*place[~usbl["lost"] & ~usbl["outlier"], ::-1].T, ".", color="#555555", ms=5, label="USBL fix")
     axes.plot(*place[~usbl["lost"] & usbl["outlier"], ::-1].T, "x", color=OUTLIER, ms=6, label="outlier")
     axes.plot(*position[:1, 1::-1].T, "o", color="white", mec="black", ms=9, label="start", zorder=6)
@@ -145,7 +145,7 @@ def _current(axes: Axes, log: TrialLog, shown: Array) -> None:
     inset.set_title(text, fontsize=9.5, color=WATER, pad=3)
 
 
-def _believable(log: TrialLog) -> NDArray[np.bool_]:
+def _usable(log: TrialLog) -> NDArray[np.bool_]:
     """Which estimates to draw: those between the first fix and docking, when the motion is that of a free vehicle."""
     estimate = log["estimate"]
     return estimate["initialised"] & (phase_at(log, estimate["time"]) != Phase.DOCKED)
@@ -162,13 +162,13 @@ def _zoom(axes: Axes, log: TrialLog, side: float) -> None:
     nose, estimate = in_dock_frame(log, nose_position(log)), log["estimate"]
     heading = estimate["heading"]
     ahead = log.number("vehicle_nose") * np.stack([np.cos(heading), np.sin(heading), 0.0 * heading], axis=-1)
-    believed = in_dock_frame(log, estimate["position"] + ahead)[_believable(log)]
+    estimated = in_dock_frame(log, estimate["position"] + ahead)[_usable(log)]
     for wall in funnel_outline(log):
         axes.plot(*wall.T, color=DOCK, lw=2.5, zorder=5)
     axes.axhline(0.0, ls=":", color=DOCK, lw=1.1)
     axes.axvline(0.0, ls=":", color="#888888", lw=1.0)
     phase_line(axes, log, nose[:, 0], nose[:, 1], width=1.8)
-    axes.plot(believed[:, 0], believed[:, 1], marker=".", ms=4, **ESTIMATE)
+    axes.plot(estimated[:, 0], estimated[:, 1], marker=".", ms=4, **ESTIMATE)
     axes.set(xlim=(-ZOOM, 4.0), ylim=(side, -side))
     axes.set_aspect("equal", adjustable="box")
     dress(axes, f"The nose from above, last {ZOOM:.0f} m, starboard below", "along track [m]", "cross track [m]")
@@ -176,7 +176,7 @@ def _zoom(axes: Axes, log: TrialLog, side: float) -> None:
 
 def _depth(axes: Axes, log: TrialLog) -> None:
     truth, estimate, guidance = log["truth"], log["estimate"], log["guidance"]
-    seen = _believable(log)
+    seen = _usable(log)
     axes.plot(guidance["time"], guidance["depth_command"], color="#999999", lw=2.5, label="command")
     axes.axhline(log.number("dock_depth"), ls=":", color=DOCK, lw=1.3, label="dock")
     phase_line(axes, log, truth["time"], truth["position"][:, 2])

@@ -1,4 +1,4 @@
-"""What a campaign comes to: success rates, paired differences between variants, consistency of the estimators."""
+"""Statistics of a campaign: success rates, paired differences between variants, consistency of the estimators."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -43,7 +43,7 @@ class Difference:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Nees:
-    """Mean NEES a degree of freedom of a variant, each trial one sample, and where that of a consistent filter lies."""
+    """Mean NEES per degree of freedom of a variant, with the interval of a consistent filter; a trial is one sample."""
 
     variant: str
     phase: str  # "all" or one of the phases

@@ -35,7 +35,7 @@ QUALITIES = {
     "heading_rms_deg": Column("float", "deg", "error of the estimated heading, rms"),
     "velocity_rms": Column("float", "m/s", "error of the estimated surge and sway together, rms"),
     "current_rms": Column("float", "m/s", "error of the estimated current, rms"),
-    "nees_per_dof": Column("float", "1", "mean NEES of the horizontal position a degree of freedom; 1 is consistent"),
+    "nees_per_dof": Column("float", "1", "mean NEES of the horizontal position per degree of freedom; 1 is consistent"),
     "coverage_95": Column("float", "1", "share of estimates whose 95 % ellipse holds the truth"),
 }
 # Of each phase in which the vehicle is under way to the dock; without a name, of all of them.

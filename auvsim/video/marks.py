@@ -30,27 +30,29 @@ class Tracks:
 
     true: Array  # (n, 3) corners
     true_times: Array
-    believed: Array
-    believed_times: Array
+    estimated: Array
+    estimated_times: Array
     marks: list[Mark]
 
     @classmethod
     def of(cls, playback: Playback, spacing: float, dot: float) -> "Tracks":
         """The tracks with corners at least `spacing` apart, and the fixes as dots of half width `dot` [m]."""
         true = _thin(playback.positions, spacing)
-        believed = _thin(playback.belief_positions, spacing)
+        estimated = _thin(playback.belief_positions, spacing)
         corners = playback.positions[true], playback.times[true]
-        beliefs = playback.belief_positions[believed], playback.belief_times[believed]
+        beliefs = playback.belief_positions[estimated], playback.belief_times[estimated]
         marks = [*_polyline(*corners, 3.0, TRUE), *_polyline(*beliefs, 2.0, ESTIMATE)]
         for time, place, taken in zip(*playback.received_fixes(), strict=True):
             marks.append(Mark(float(time), DOT, dot, place, place, FIX if taken else REFUSED))
-        return cls(true=corners[0], true_times=corners[1], believed=beliefs[0], believed_times=beliefs[1], marks=marks)
+        return cls(
+            true=corners[0], true_times=corners[1], estimated=beliefs[0], estimated_times=beliefs[1], marks=marks
+        )
 
     def tips(self, layer: Layer, moment: Moment) -> None:
         """Draws both tracks from their last corner to where they are now."""
         _tip(layer, self.true, self.true_times, moment.time, moment.position, 3.0, TRUE)
         if moment.belief is not None:
-            _tip(layer, self.believed, self.believed_times, moment.time, moment.belief.position, 2.0, ESTIMATE)
+            _tip(layer, self.estimated, self.estimated_times, moment.time, moment.belief.position, 2.0, ESTIMATE)
 
 
 def _thin(points: Array, spacing: float) -> list[int]:

@@ -11,7 +11,7 @@ from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.navigation import navigator as navigation
 from auvsim.navigation.navigator import Navigator
 from auvsim.reproduce.paired import results, run_seed, score_tasks, scores
-from auvsim.reproduce.paper1.mujoco_runs import Recording, RunConditions, simulate, track
+from auvsim.reproduce.paper1.mujoco_runs import RunConditions, RunRecord, simulate, track
 from auvsim.reproduce.paper1.runs import TICK
 from auvsim.reproduce.paper1.study import AFTER, FILTERS, Result, Row, Score
 from auvsim.reproduce.paper1.yardsticks import along, mean_square
@@ -52,7 +52,7 @@ ROWS: dict[str, Row[RunConditions]] = {
         ("jitter", "a fix every 3 to 8 s", AFTER, replace(STEADY, interval=(3.0, 8.0))),
         ("outliers", "10 % outliers of 10 to 30 m", AFTER, replace(STEADY, usbl={"outlier_probability": 0.1})),
         ("small_outliers", "10 % outliers of 1 to 3 m", AFTER, replace(STEADY, usbl=_SMALL)),
-        ("thrust", "X_nn believed 10 % too large", AFTER, replace(STEADY, thrust=1.0 / 1.1)),
+        ("thrust", "X_nn assumed 10 % too large", AFTER, replace(STEADY, thrust=1.0 / 1.1)),
         ("compass", "compass 2 degrees off", AFTER, replace(STEADY, compass_bias=math.radians(2.0))),
         ("approach", "straight to the dock from 300 m", (AFTER[0], math.inf), APPROACH),
     )
@@ -70,7 +70,7 @@ def _regular(parameters: PlanarParameters, plan: Scenario) -> Navigator:
     return navigation._docking(parameters, plan, partial(PaperFilter, weights=None), PAPER_NOISE, delayed=False)
 
 
-# What estimators of the paper believe: nothing of the dock's compass, as published. Taken for noise of every fix, as
+# What estimators of the paper assume: nothing of the dock's compass, as published. Taken for noise of every fix, as
 # trials have it, its error slows eq. 11 down: in a turn at 40 m to 1.7 times the position error.
 _PUBLISHED = {"dock_heading_deg": 1e-6}
 _CONSTANT = {"current_noise": 1e-8}
@@ -94,7 +94,7 @@ assert NAVIGATORS.keys() == FILTERS.keys()
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class MujocoStudy:
-    """What the study came to."""
+    """Results of the study."""
 
     seed: int
     quick: bool
@@ -143,13 +143,13 @@ def _scores(filters: Sequence[str], rows: Mapping[str, Row], seed: int) -> dict[
     return scores(rows, run, {key: track(run, navigator(key, run)) for key in filters})
 
 
-_UNCERTAIN = 0.01  # of the process noise that filters believe in: MuJoCo's vehicle has none, its model errs a little
+_UNCERTAIN = 0.01  # of the process noise that filters assume: MuJoCo's vehicle has none, its model errs a little
 
 
 def bound(row: Row[RunConditions], seed: int) -> float:
     """Mean square [m^2] of the posterior Cramér-Rao bound of the position in a row without turns, losses or outliers.
 
-    That of a filter which knows the vehicle but for a hundredth of the process noise that the others believe, the
+    That of a filter which knows the vehicle but for a hundredth of the process noise that the others assume, the
     current to be constant, and of the two compasses' errors how large they are in the mean.
     """
     run = simulate(row.conditions, seed)
@@ -168,8 +168,8 @@ def _nearly_certain(noise: DockingNoise) -> DockingNoise:
     return replace(noise, current=1e-8, biases=biases, **{k: _UNCERTAIN * getattr(noise, k) for k in names})
 
 
-def navigator(key: str, run: Recording) -> Navigator:
-    """A navigator of NAVIGATORS for a run, which believes the fixes to be as good as they are."""
+def navigator(key: str, run: RunRecord) -> Navigator:
+    """A navigator of NAVIGATORS for a run, which assumes the fixes' true noise."""
     factory, settings = NAVIGATORS[key]
     beliefs = run.plan.estimator.model_copy(update=settings)
     made = factory(run.parameters, run.plan.model_copy(update={"estimator": beliefs}))

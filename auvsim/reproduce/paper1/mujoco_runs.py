@@ -57,8 +57,8 @@ class RunConditions:
     fixes_of: float | None = None  # distance whose noise and delay all fixes have [m]; None: that at which they are
     usbl: Mapping[str, Any] = field(default_factory=dict)  # of UsblSettings
     acoustics: Mapping[str, Any] = field(default_factory=dict)  # of AcousticSettings
-    thrust: float = 1.0  # X_nn by what filters believe of it
-    compass_bias: float | None = None  # what the compass shows too much [rad]; None: drawn, as in trials
+    thrust: float = 1.0  # true X_nn relative to that which filters assume
+    compass_bias: float | None = None  # bias of the vehicle's compass [rad]; None: drawn, as in trials
     planar: bool = False  # instead of MuJoCo's, the truth of the condensed model with the planar study's process noise
 
 
@@ -72,24 +72,24 @@ class Tick(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Recording:
+class RunRecord:
     """What happened."""
 
     plan: Scenario
-    parameters: PlanarParameters  # as a navigator believes them
-    usbl: UsblModel  # the fixes' noise, as it may believe it
+    parameters: PlanarParameters  # that a navigator assumes
+    usbl: UsblModel  # noise of the fixes that it may assume
     ticks: tuple[Tick, ...]
     times: Array  # (k,) [s]
     states: Array  # (k, 8); the heading is wrapped
 
 
-def simulate(conditions: RunConditions, seed: int) -> Recording:
+def simulate(conditions: RunConditions, seed: int) -> RunRecord:
     """The run of a seed."""
     plan, parameters = _plan(conditions), planar_fit.fit_planar_model(VEHICLE, SPEED).parameters
     ticks = tuple(run_ticks(conditions, plan, seed))
     usbl = plan.sensors.usbl
     ranges, deviations = zip(*usbl.noise, strict=True)
-    return Recording(
+    return RunRecord(
         plan=plan,
         parameters=replace(parameters, X_nn=parameters.X_nn / conditions.thrust),
         usbl=UsblModel(transceiver=usbl.transceiver, ranges=ranges, deviations=deviations),
@@ -99,7 +99,7 @@ def simulate(conditions: RunConditions, seed: int) -> Recording:
     )
 
 
-def track(recording: Recording, navigator: Navigator) -> Track:
+def track(recording: RunRecord, navigator: Navigator) -> Track:
     """How a navigator follows a run."""
     count = len(recording.ticks)
     means, covariances = np.full((count, 8), math.nan), np.zeros((count, 8, 8))
@@ -134,19 +134,19 @@ def run_ticks(conditions: RunConditions, plan: Scenario, seed: int) -> Iterator[
     def noise(source: str) -> Generator:
         return stream(seed, 0, f"{VEHICLE}/{source}")
 
-    believed, vehicle, rates = planar_fit.fit_planar_model(VEHICLE, SPEED), library.vehicle(VEHICLE), plan.rates
+    assumed, vehicle, rates = planar_fit.fit_planar_model(VEHICLE, SPEED), library.vehicle(VEHICLE), plan.rates
     bearing, direction, side = noise("conditions").uniform(-math.pi, math.pi, 3).tolist()
     current = _current(conditions, direction, side)
     world, steps = _world(conditions, plan, vehicle, current, noise("process"))
     instruments = _Instruments(conditions, plan, noise)
     limits = vehicle.allocation.limit, vehicle.shaft_limit
-    autopilot = Autopilot(plan.control, believed.shaft_speed_for, *limits, 1.0 / rates.control)
+    autopilot = Autopilot(plan.control, assumed.shaft_speed_for, *limits, 1.0 / rates.control)
 
     distance = conditions.approach or conditions.radius
     place = np.array((distance * math.cos(bearing), distance * math.sin(bearing), POSE.depth))
     water = current.evaluate(0.0, place).velocity
     state = np.array((*place[:2], 0.0, SPEED, 0.0, 0.0, *water[:2]))
-    commands = Commands(0.0, 0.0, believed.shaft_speed)
+    commands = Commands(0.0, 0.0, assumed.shaft_speed)
     world.place(place, _heading(conditions, state), SPEED, commands.shaft_speed)
     truth, since = world.truth(), []
     for tick in range(1, round(conditions.duration * rates.control) + 1):
