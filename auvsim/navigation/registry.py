@@ -1,6 +1,7 @@
 """The estimators by their kinds, and how one is made for a vehicle."""
 
 from dataclasses import replace
+from typing import Any
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
@@ -34,7 +35,7 @@ def build(setup: NavigatorSetup) -> Navigator:
         where = f"estimator '{kind}': settings"
         setup = replace(setup, settings=plugins.settings_of(factory, setup.settings.settings, where))
     try:
-        navigator = factory(setup)
+        navigator: Any = factory(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's factory may fail in any way

@@ -61,8 +61,8 @@ def run(
         InputError: a model, a part or a number of the scenario cannot be used.
     """
     started = wall.perf_counter()
-    simulation = Simulation(scenario, seed, trial, path=path)
-    log, status = simulation.log, "complete"
+    simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
+    log: Any = simulation.log
     with log:
         try:
             last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
