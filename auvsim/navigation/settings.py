@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from auvsim.base.settings import OwnPart, Settings, tell
+from auvsim.base.settings import OwnPart, Settings, tag_by_kind
 
 
 class _Assumed(Settings):
@@ -74,5 +74,5 @@ EstimatorSettings = Annotated[
     | Annotated[InteractingSettings, Tag("InteractingSettings")]
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
-    Discriminator(tell(AugmentedSettings, InteractingSettings, PaperSettings, OwnEstimator)),
+    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, OwnEstimator)),
 ]

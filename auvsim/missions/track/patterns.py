@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from auvsim.base.frames import Array
-from auvsim.base.settings import Settings, tell
+from auvsim.base.settings import Settings, tag_by_kind
 
 
 class Waypoints(Settings):
@@ -33,7 +33,7 @@ class LawnMower(Settings):
 
 Pattern = Annotated[
     Annotated[Waypoints, Tag("Waypoints")] | Annotated[LawnMower, Tag("LawnMower")],
-    Discriminator(tell(Waypoints, LawnMower)),
+    Discriminator(tag_by_kind(Waypoints, LawnMower)),
 ]
 
 
