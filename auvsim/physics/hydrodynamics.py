@@ -212,7 +212,7 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
         raise InputError("option density and viscosity must be 0: MuJoCo's own fluid model would act as well")
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
         raise InputError(
-            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up"
+            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so that added mass would accumulate"
         )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
@@ -238,7 +238,7 @@ def _channel(model: mujoco.MjModel, name: str) -> int:
     """Where the command of a thruster is, as its record holds it.
 
     Raises:
-        InputError: it has no actuator of its name, or one that pushes by itself.
+        InputError: it has no actuator of its name, or its actuator exerts a force of its own.
     """
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     if index < 0:

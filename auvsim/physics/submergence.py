@@ -1,4 +1,4 @@
-"""How much of a hull, fin or propeller is under the surface, as compiled functions."""
+"""Submerged part of a hull, fin or propeller, as compiled functions."""
 
 import math
 
