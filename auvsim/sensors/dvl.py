@@ -92,7 +92,7 @@ class Dvl(Sensor):
         self._below = np.array((0.0, 0.0, 0.5 * sum(settings.water_layer)))
 
     def measure(self, truth: Truth, world: Surroundings) -> Reading:
-        """Pings once at each."""
+        """Pings once and measures both tracks."""
         settings = self.settings
         noise = self.biases + self._sigmas * self._noise.normals(6)
         chances = self._noise.uniforms(2)
