@@ -1,4 +1,4 @@
-"""The controllers by their kinds."""
+"""Registry of the controllers by kind."""
 
 from collections.abc import Callable
 from dataclasses import replace
