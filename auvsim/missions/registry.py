@@ -1,4 +1,4 @@
-"""The missions by their kinds, and what a scenario may say of each."""
+"""Registry of the missions by kind, and the settings of each."""
 
 from collections.abc import Callable
 from dataclasses import replace
