@@ -16,7 +16,7 @@ PLACE = "command line"
 
 
 def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
-    """Parts the command's own arguments from the keys of the scenario, which become nested values.
+    """Separates the command's own arguments from the keys of the scenario, which become nested values.
 
     `--current.speed 0.2` and `--current.speed=0.2` are keys; the value is YAML. Hyphens stand for underscores.
 
