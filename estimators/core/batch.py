@@ -40,8 +40,8 @@ def solve(
     Args:
         nodes: Times, inputs and measurements; those of the first node are in the prior.
         prior: Belief at the first node, with its measurements.
-        process: How states move on; its noise must reach all states.
-        models: What the measurements of each kind show; kinds not named are ignored.
+        process: Process model; its noise must reach all states.
+        models: Measurement model of each kind; kinds not named are ignored.
         guess: States (k, n) to start from, those of a filter say.
         angles: States that are angles.
         iterations: At most.

@@ -1,4 +1,4 @@
-"""What filters pass round: beliefs, measurements, and the two kinds of model a user may bring."""
+"""Types that filters share: beliefs, measurements, outcomes, and the contracts of process and measurement models."""
 
 import math
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ class Measurement:
 
 
 class Verdict(NamedTuple):
-    """What a filter decided about a measurement; a plain tuple of the same three will do where time is short."""
+    """A filter's decision about a measurement; a plain tuple of the same three is accepted, too."""
 
     measurement: Measurement
     reason: str = ""  # why it was refused; "" if it was used
@@ -60,7 +60,7 @@ class Outcome(NamedTuple):
 
 
 class ProcessModel(Protocol):
-    """How a state moves on: x' = f(x, u, dt) + noise of covariance Q(x, u, dt)."""
+    """A process model: x' = f(x, u, dt) + noise of covariance Q(x, u, dt)."""
 
     def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """State (n,) after `dt` [s] with the input `u` held."""
@@ -76,7 +76,7 @@ class ProcessModel(Protocol):
 
 
 class MeasurementModel(Protocol):
-    """What a sensor shows of a state: y = g(x) + noise of covariance R(x, measurement)."""
+    """A measurement model: y = g(x) + noise of covariance R(x, measurement)."""
 
     def evaluate(self, x: Array) -> Array:
         """Value (m,) expected in the state `x` (n,)."""

@@ -96,11 +96,11 @@ class PaperFilter:
     reason the position noise is inflated, and its covariance is not consistent.
 
     Without `weights` the current stays zero: the paper's regular filter, if delays are not compensated either (see
-    `DockingEstimator`), and its half-measure, if they are.
+    `DockingEstimator`), and its delay-compensated half, if they are.
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise; that of the current is not used.
+        noise: Noise that it assumes; that of the current is not used.
         weights: a_0 .. a_m of eq. 11; None leaves the current zero.
         **options: See `PlanarModels`; the paper's integrator is "euler" with substeps of 0.5 s.
     """
@@ -163,7 +163,7 @@ class PaperFilter:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class DockingEstimate:
-    """What a docking estimator knows at one time; zeros before the first fix."""
+    """Estimate of a docking estimator at one time; zeros before the first fix."""
 
     time: float  # [s]
     mean: Array  # (8,) north, east [m], psi [rad], u, v [m/s], r [rad/s], current c_n, c_e [m/s]
@@ -171,7 +171,7 @@ class DockingEstimate:
     current: Array  # (2,) north, east [m/s]
     initialised: bool
     refused: Mapping[str, int]  # measurements refused so far, by reason; "outlier" by the filter's gate
-    reinitialised: int = 0  # how often the filter had to start anew, because its numbers were no longer finite
+    reinitialised: int = 0  # number of restarts after its numbers were no longer finite
     innovation: Innovation | None = None  # of the latest fix, by stamp, that the filter has seen
     # Fates of measurements decided since the last tick. One whose verdict a replay or a recovery has changed is here
     # again: of several outcomes of a measurement the last one holds.
@@ -192,7 +192,7 @@ class DockingEstimator:
 
     Args:
         filter: `AugmentedFilter`, `InteractingFilter`, `PaperFilter`, or one of that form.
-        usbl: What is believed of the dock's USBL.
+        usbl: Model of the dock's USBL.
         step: Nominal time between ticks [s].
         keep: Age up to which fixes are used [s].
         compensate_delay: False takes every fix as made at the tick it arrives at, whatever its stamp or number: the

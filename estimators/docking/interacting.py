@@ -29,7 +29,7 @@ from estimators.planar.model import PlanarParameters, PlanarProcess
 
 ANGLES = (2,)  # the heading
 SHORTEST = 0.1  # time between fixes that counts at least, so that no mode ever dies out [s]
-TRUSTED = 3  # fixes taken before the filter believes itself more than two fixes that agree against it
+MIN_ACCEPTED = 3  # fixes accepted before two fixes that agree with each other no longer suffice to correct the filter
 
 
 class InteractingState(NamedTuple):
@@ -53,20 +53,20 @@ class InteractingState(NamedTuple):
 class InteractingFilter:
     """Interacting extended Kalman filters that differ in how fast the current may change (sec. 13), for a `History`.
 
-    Each fix is weighed against being an outlier in each mode. Modes change at constant rates, however often
+    In each mode, a fix is weighted by its probability of being no outlier. Modes change at constant rates, however often
     fixes come: right after a fix, by what the time since the fix before it allows. The compass says nothing of the
     modes, which share the heading.
 
-    A filter that takes good fixes for outliers, because it is wrong itself, is set right as `AugmentedFilter` is, by
-    fixes that agree against it: by two if it has taken fewer than three, as after a wrong first fix, else by three.
+    A filter that takes good fixes for outliers, because it is wrong itself, recovers as `AugmentedFilter` does, by
+    fixes that agree with each other: two if it has accepted fewer than three, as after a wrong first fix, else three.
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise, but for the current's; and the biases that it estimates besides.
+        noise: Noise that it assumes, the current's excepted; and the biases that it estimates besides.
         currents: Random walk of the current in each mode [m^2/s^3], the slowest first.
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at the first fix (m,).
-        outliers: What is believed of fixes that are wrong.
+        outliers: Model of outliers among the fixes.
         **options: See `PlanarModels`.
     """
 
@@ -138,7 +138,7 @@ class InteractingFilter:
         if is_wrong or (state.rejected and innovation.nis > chi_square(recovery.PROBABLE, 2)):
             now = self._rejected(state, fix, modes, innovation.nis)
             agreeing = recovery.agreeing(now, state.rejected, self.noise)
-            needed = 1 if state.accepted < TRUSTED else 2
+            needed = 1 if state.accepted < MIN_ACCEPTED else 2
             if len(agreeing) >= needed or (is_wrong and len(state.rejected) >= recovery.REMEMBERED):
                 earlier = agreeing[0] if agreeing else state.rejected[-1]
                 recovered = recovery.recover(state.belief, earlier, now, self.noise)
@@ -172,7 +172,7 @@ def _generator(rates: Array, modes: int) -> Array:
     """
     Q = rates.copy() if rates.shape == (modes, modes) else np.full((modes, modes), -1.0)
     np.fill_diagonal(Q, 0.0)
-    # Every mode leads to every other, at once or by way of others.
+    # Every mode leads to every other, at once or through others.
     if (Q < 0.0).any() or not (np.linalg.matrix_power(np.eye(modes) + (Q > 0.0), modes) > 0.0).all():
         raise ParameterError(
             f"{modes} modes need a row and a column of switching rates each, none below 0, that lead from every mode "

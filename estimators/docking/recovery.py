@@ -1,4 +1,4 @@
-"""How a filter that rejects fixes finds out that it is wrong itself: fixes that disagree with it, but not together."""
+"""Recovery of a filter that is wrong itself: by rejected fixes that agree with each other."""
 
 import math
 from typing import NamedTuple
@@ -13,7 +13,7 @@ from estimators.docking.models import DockingNoise
 REMEMBERED = 4  # rejected fixes that are kept; the next one then is taken in any case
 PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
 AGREEMENT = 0.99  # probability with which two good fixes are found to agree
-MAX_AGE = 30.0  # age at which a rejected fix says nothing more of the present [s]
+MAX_AGE = 30.0  # age beyond which a rejected fix is discarded [s]
 
 
 class Rejected(NamedTuple):
@@ -43,7 +43,7 @@ def agree(now: Rejected, earlier: list[Rejected], noise: DockingNoise) -> bool:
     """Whether one error of the position and one of the current explain all innovations.
 
     The current's error has the deviation that it has at first, and may change by as much in the time after which a fix
-    is forgotten. So two fixes agree if they lie within reach of such a current, and three only if they nearly move
+    is discarded. So two fixes agree if they lie within reach of such a current, and three only if they nearly move
     along: wrong fixes do so far more rarely.
     """
     ages = np.array([now.fix.stamp - rejected.fix.stamp for rejected in earlier])
