@@ -44,7 +44,7 @@ class Channel:
         self._count = 0  # breaks ties of arrival in the order sent
 
     def send(self, message: Message, slant_range: float, *, lost: bool = False) -> Fate:
-        """Sends a message over a distance [m]; `lost` marks a message that was never sent, because the receiver was out of reach."""
+        """Sends a message over a distance [m]; `lost`: never sent, being out of reach."""
         settings, to = self._settings, message.destination or ""
         drop, jitter, late, twice, gap = self._noise.uniforms(5)
         if lost:

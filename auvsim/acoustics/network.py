@@ -12,7 +12,7 @@ class Link(Protocol):
     """What carries messages to one receiver."""
 
     def send(self, message: Message, slant_range: float, *, lost: bool = False) -> Fate:
-        """Takes a message over a distance [m]; `lost` marks a message that was never sent, because the receiver was out of reach."""
+        """Takes a message over a distance [m]; `lost`: never sent, being out of reach."""
         ...
 
     def receive(self, now: float) -> list[Delivery]:

@@ -18,7 +18,7 @@ def loads(library: str) -> bool:
 def choose_renderer(
     environment: MutableMapping[str, str] = os.environ, available: Callable[[str], bool] = loads
 ) -> None:
-    """Makes MuJoCo draw without a display where the libraries for that are installed, and switches drawing off where not.
+    """Makes MuJoCo draw without a display where the libraries for that are there, and switches drawing off elsewhere.
 
     Does nothing where the user chose a renderer, on desktops, and on systems other than Linux.
     """

@@ -1,4 +1,4 @@
-"""The estimators of `estimators.docking` behind the contract of a run: from readings to what their filters take."""
+"""Adapters of the docking estimators to the contract of a run: readings in, estimates out."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

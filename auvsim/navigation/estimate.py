@@ -1,4 +1,4 @@
-"""What an estimator says: named states with their covariance, views of them, and the fates of measurements."""
+"""An estimate: named states with covariance, the views that control and plots use, outcomes of measurements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -7,7 +7,7 @@ integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in fre
 
 With v_r the hull's velocity relative to the water, omega its angular velocity, G the gradient of the water's velocity
 and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is `-M_A J qacc` (in M) plus
-`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull moves into water of another velocity. A gradient also takes
+`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull enters other water as it moves. A gradient also takes
 `G' p` from the force, p being the linear part of the impulse `M_A nu_r` (Galper & Miloh 1995, J. Fluid Mech. 295), and
 the water's own pressure adds `rho V a_c` at the centre of buoyancy. Force and moment are then those of the kinetic
 energy `nu_r' M_A nu_r / 2`, exact in irrotational strain but for moments of the order of M_A G^2. In rotational shear

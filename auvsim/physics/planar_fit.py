@@ -1,4 +1,4 @@
-"""Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics, with the error of the fit."""
+"""Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics; gives the fit's error."""
 
 import math
 from dataclasses import dataclass
@@ -95,7 +95,7 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
         InputError: the speed is not positive, or the vehicle cannot reach it.
     """
     if not 0.0 < speed < 20.0:
-        raise InputError(f"cannot fit the planar model of '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
+        raise InputError(f"no planar model of '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
     level = _Level(vehicle, density)
     shaft = _steady_shaft(level, vehicle, speed)
     generator = np.random.default_rng(0)

@@ -31,7 +31,7 @@ class DvlSettings(Settings):
     """
 
     enabled: bool = Field(default=False, description="whether the vehicle has it")
-    rate: float = Field(default=5.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=5.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     bottom_noise: Vector = Field(
         default=(0.01, 0.01, 0.004), description="white noise over ground: forward, starboard, down, sd [m/s]"
     )
