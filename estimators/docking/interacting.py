@@ -53,7 +53,7 @@ class InteractingState(NamedTuple):
 class InteractingFilter:
     """Interacting extended Kalman filters that differ in how fast the current may change (sec. 13), for a `History`.
 
-    In each mode, a fix is weighted by its probability of being no outlier. Modes change at constant rates, however often
+    In each mode a fix is weighted by its probability of being no outlier. Modes switch at constant rates, however often
     fixes come: right after a fix, by what the time since the fix before it allows. The compass says nothing of the
     modes, which share the heading.
 
