@@ -55,10 +55,8 @@ def allowed(module: str, imported: str) -> bool:
     if root != "auvsim":
         return True
     if name in ORDER:
-        return (
-            part not in ORDER
-            and part in ("", "__version__")
-            or (part in ORDER and ORDER.index(part) <= ORDER.index(name))
+        return (part not in ORDER and part in ("", "__version__")) or (
+            part in ORDER and ORDER.index(part) <= ORDER.index(name)
         )
     return imported == "auvsim.base.renderer.choose_renderer"  # the package itself chooses the renderer
 

@@ -79,7 +79,8 @@ class Network:
         fates = []
         for receiver, distance in to.items():
             link = self._links.get(receiver)
-            fates.append(link.send(message, distance) if link else Fate(message, receiver, math.nan, "no modem"))
+            fate = link.send(message, distance) if link else Fate(message, receiver, math.nan, "no modem")
+            fates.append(fate._replace(destination=receiver))
         return fates
 
     def deliver(self, receiver: str, now: float) -> list[Delivery]:

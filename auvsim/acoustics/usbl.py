@@ -78,6 +78,18 @@ class UsblSettings(Settings):
             raise ValueError(f"outlier_maximum must be at least outlier_minimum, {self.outlier_minimum} m")
         return self
 
+    def sigma(self, slant_range: float) -> float:
+        """Standard deviation per axis [m] at a range [m]: log-log in the table, constant beyond its ends."""
+        ranges, sigmas = ([math.log(number) for number in column] for column in zip(*self.noise, strict=True))
+        x = math.log(slant_range) if slant_range > 0.0 else -math.inf
+        if x <= ranges[0]:
+            return self.noise_scale * math.exp(sigmas[0])
+        if x >= ranges[-1]:
+            return self.noise_scale * math.exp(sigmas[-1])
+        index = bisect_right(ranges, x) - 1
+        fraction = (x - ranges[index]) / (ranges[index + 1] - ranges[index])
+        return self.noise_scale * math.exp(sigmas[index] + fraction * (sigmas[index + 1] - sigmas[index]))
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Ping:
@@ -141,8 +153,6 @@ class Usbl:
         self.vehicle, self.structure = vehicle, structure
         self._clock_offset, self._occupant = clock_offset, occupant
         self._noise = Noise(generator)
-        self._log_ranges = [math.log(row[0]) for row in settings.noise]
-        self._log_sigmas = [math.log(row[1]) for row in settings.noise]
         heading, pitch, roll, depth = self._noise.normals(4)
         heading_bias = math.radians(settings.dock_heading_bias_deg) * heading
         tilt_bias = math.radians(settings.dock_tilt_bias_deg)
@@ -174,19 +184,6 @@ class Usbl:
             pings.append(self._ping(previous, now))
         return pings
 
-    def sigma(self, slant_range: float) -> float:
-        """Standard deviation per axis [m] at a range [m]: log-log in the table, constant beyond its ends."""
-        ranges, sigmas = self._log_ranges, self._log_sigmas
-        scale = self._settings.noise_scale
-        x = math.log(slant_range) if slant_range > 0.0 else -math.inf
-        if x <= ranges[0]:
-            return scale * math.exp(sigmas[0])
-        if x >= ranges[-1]:
-            return scale * math.exp(sigmas[-1])
-        index = bisect_right(ranges, x) - 1
-        fraction = (x - ranges[index]) / (ranges[index + 1] - ranges[index])
-        return scale * math.exp(sigmas[index] + fraction * (sigmas[index + 1] - sigmas[index]))
-
     def _ping(self, previous: Truth, now: Truth) -> Ping:
         settings, time = self._settings, self._next
         position, turn = interpolate(previous, now, time)
@@ -194,7 +191,7 @@ class Usbl:
         slant_range = math.sqrt(float(relative @ relative))
         draws = self._noise.normals(7)
         chance, size, wait = self._noise.uniforms(3)
-        measured = relative + self.sigma(slant_range) * np.array(draws[:3])
+        measured = relative + settings.sigma(slant_range) * np.array(draws[:3])
         outlier = chance < settings.outlier_probability
         if outlier:
             direction = np.array(draws[3:6])  # a normalised normal vector is uniform on the sphere

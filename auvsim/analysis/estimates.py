@@ -13,7 +13,7 @@ from auvsim.data.phases import interpolate, phase_at
 from auvsim.missions.docking.dock_frame import to_body
 from auvsim.navigation.estimate import PLANAR_STATES
 from estimators.core.consistency import chi_square, interval, normalised_square
-from estimators.docking.usbl import horizontal_rotation
+from estimators.docking.usbl import UsblFix, UsblModel
 
 NEES_INTERVAL = interval(2)  # 95 % of the NEES of a horizontal position
 NOT_STARTED, DUPLICATE = "not_started", "duplicate"  # reasons for which readings are refused, see `core.history`
@@ -142,19 +142,21 @@ def fixes(log: VehicleLog) -> Array:
     """Horizontal NED positions (n, 2) [m] of the transponder that the USBL packets say, lost ones included."""
     if "usbl" not in log or not len(log["usbl"]["time"]):
         return np.empty((0, 2))
-    dock, source = _usbl(log)
-    origin = dock.position[:2]
-    transceiver = [source.number(f"transceiver_{axis}") for axis in ("forward", "starboard", "down")]
-    packets = log["usbl"]["value"]
-    places = [horizontal_rotation(*packet[3:6]) @ (packet[:3] + transceiver) + origin for packet in packets]
-    return np.array(places, dtype=float).reshape(len(packets), 2)
+    dock = usbl_dock(log)
+    forward, starboard, down = (dock.number(f"transceiver_{a}", 0.0) for a in ("forward", "starboard", "down"))
+    model, packets = UsblModel(transceiver=(forward, starboard, down)), log["usbl"]["value"]
+    found = [UsblFix(stamp=0.0, received=0.0, position=p[:3], heading=p[3], pitch=p[4], roll=p[5]) for p in packets]
+    places = np.array([model.world_fix(fix).value for fix in found], dtype=float).reshape(len(packets), 2)
+    return places + dock.position[:2]
 
 
-def _usbl(log: VehicleLog) -> tuple[StructureLog, VehicleLog | StructureLog]:
-    """The structure whose USBL serves a vehicle, and what says where its transceiver is; in old logs the structure."""
-    named = str(log.attributes.get("usbl_structure") or log.attributes["dock"])
-    dock = log.log.structure(named)
-    return dock, log if "transceiver_down" in log.attributes else dock
+def usbl_dock(log: VehicleLog) -> StructureLog:
+    """The structure whose USBL serves a vehicle.
+
+    Raises:
+        InputError: the log names none.
+    """
+    return log.log.structure(str(log.attributes.get("usbl_structure") or log.attributes.get("dock", "")))
 
 
 def _rms(errors: Array) -> float | None:

@@ -5,8 +5,8 @@ import math
 from typing import Any
 
 from auvsim.analysis.estimates import estimate_errors, estimate_quality
+from auvsim.data.attributes import WALL_TIME
 from auvsim.data.log import Log, VehicleLog
-from auvsim.data.variables import WALL_TIME
 from auvsim.missions.docking.metrics import end_of
 from auvsim.missions.registry import MISSIONS, find
 

@@ -16,6 +16,20 @@ from auvsim.base.settings import OwnPart, kinds
 WIDTH = 120  # columns of the commented YAML
 
 
+class UnknownKey(ValueError):
+    """Raised by a validator that found a key which its settings do not have.
+
+    Args:
+        key: that is unknown.
+        siblings: those that there are.
+        more: what else is right, appended to the suggestion.
+    """
+
+    def __init__(self, key: str, siblings: list[str], more: str = "") -> None:
+        super().__init__(f"unknown key {key}")
+        self.key, self.siblings, self.more = key, siblings, more
+
+
 def members(annotation: Any) -> list[type[BaseModel]]:
     """The settings classes an annotation allows: several for a union told apart by `kind`, none for plain values.
 
@@ -84,7 +98,12 @@ def explain(error: ValidationError, model: type[BaseModel], values: Mapping, pla
     ]
     report = min(reports, key=lambda report: report["type"] != "extra_forbidden")
     path, owner, field = _locate(report["loc"], model, values)
-    text = _reason(report, path, model, owner, field)
+    cause = report.get("ctx", {}).get("error")
+    if isinstance(cause, UnknownKey):
+        path = f"{path}.{cause.key}"
+        text = f"unknown key; {suggestion(path, model, cause.siblings)}{cause.more}"
+    else:
+        text = _reason(report, path, model, owner, field)
     path, text = (path, text) if path else text.split(": ", 1) if ": " in text else ("", text)
     more = f" ({len(reports) - 1} more wrong)" if len(reports) > 1 else ""
     return InputError(": ".join(part for part in (place(path, places), path, text + more) if part))
@@ -105,6 +124,8 @@ def _locate(
     annotation: Any = model
     for part in location:
         if isinstance(values, Mapping) and part not in values and _is_tag(part, annotation, values):
+            continue
+        if part == "[key]":  # the name that the user chose is itself at fault
             continue
         path.append(str(part))
         if isinstance(part, int):
@@ -147,7 +168,7 @@ def _reason(
         return message.removeprefix("Value error, ")
     value = yaml_text.dump(report["input"], flow=True)
     value = value if len(value) <= 60 else value[:57] + "..."
-    return f"{value} {message.replace('Input should', 'should', 1).replace('be an object', 'be a mapping')}{about}"
+    return f"{value} {message.replace('Input should', 'should', 1).replace('be an object', 'be a mapping').replace('String should', 'should', 1)}{about}"
 
 
 def place(path: str, places: Mapping[str, str]) -> str:
@@ -158,7 +179,7 @@ def place(path: str, places: Mapping[str, str]) -> str:
 
 def _section(model: type[BaseModel], values: Mapping, depth: int) -> Iterator[str]:
     indent = "  " * depth
-    for name, field in model.model_fields.items():
+    for name, field in sorted(model.model_fields.items(), key=lambda item: item[0] != "kind"):
         value = values[name] if name in values else _default(field)
         below = member(field.annotation, value)
         if below is None or not isinstance(value, Mapping) or not (value.keys() & below.model_fields.keys()):

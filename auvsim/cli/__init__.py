@@ -34,9 +34,29 @@ class Dock:
     out: Path = Path("out")
     """Folder of trial.nc, summary.json, track.png, estimates.png and docking.mp4."""
     estimator: Annotated[str | None, tyro.conf.arg(metavar="NAME|PACKAGE.MODULE:FACTORY")] = None
-    """Estimator that navigates; the same as --estimator.factory."""
+    """Estimator that navigates; the same as --estimator.kind."""
     video: bool = True
     """Whether to draw docking.mp4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Runs whatever a scenario says: one vehicle or several, docking, on a track or in manoeuvres.
+
+    Any key of the scenario is an option too, such as `--vehicles.auv_1.estimator.kind imm`. Exit codes as of
+    `auvsim dock`.
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
+    """The scenario, or the name of a shipped one (three_vehicles)."""
+    seed: int = 0
+    """Seed of every random number."""
+    trial: int = 0
+    """Number of the run under that seed."""
+    out: Path = Path("out")
+    """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several."""
+    video: bool = True
+    """Whether to draw run.mp4."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -190,6 +210,7 @@ class Study:
 
 Command = (
     Dock
+    | Run
     | Campaign
     | Report
     | Manoeuvre
@@ -201,7 +222,7 @@ Command = (
     | Study
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
-TAKE_SCENARIO_KEYS = {"dock": Dock, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -241,12 +262,22 @@ def _run(arguments: list[str]) -> int:
         return 0
 
     if isinstance(command, Dock):
-        from auvsim.cli import dock, options
+        from auvsim.cli import options, run
 
         scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
-        if scenario.manoeuvre is not None:
-            raise InputError(f"the scenario is a manoeuvre; run it with `auvsim manoeuvre {scenario.manoeuvre.kind}`")
-        return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+        _, vehicle = scenario.lone
+        if vehicle.mission.kind != "docking":
+            raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `auvsim run`")
+        return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+
+    if isinstance(command, Run):
+        from auvsim.cli import options, run
+
+        path = run.find(command.scenario)
+        scenario = options.scenario(path, None, values, command.seed, command.trial)
+        return run.run(
+            scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
+        )
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign

@@ -10,7 +10,7 @@ from rich.table import Table
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.campaign import cluster, execution, folder, local, plan, statistics, table
 from auvsim.campaign.folder import Folder
-from auvsim.cli import dock
+from auvsim.cli import run as running
 from auvsim.cli.report import CampaignProgress
 from auvsim.simulation import scenario
 
@@ -65,7 +65,7 @@ def replay(name: str, trial: int, *, variant: str | None, out: Path | None, vide
     parsed = scenario.parse(chosen.values(variant, trial))
     here = Folder(Path(name), chosen).replay_path(variant, trial)
     path = out or (here if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{variant}-{trial}")
-    code = dock.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
+    code = running.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
     print(f"written: {path}", file=sys.stderr)
     return code
 

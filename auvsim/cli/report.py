@@ -27,7 +27,7 @@ class ProgressState(Protocol):
     time: float  # simulated time [s]
     duration: float  # time limit [s]
     phase: str
-    range: float  # true distance to the dock's mouth [m]
+    range: float  # true distance to the dock's mouth [m]; NaN without one
 
 
 class _Bar:
@@ -61,7 +61,8 @@ class TrialProgress(_Bar):
         super().__init__(name)
 
     def __call__(self, state: ProgressState) -> None:
-        self._show(state.time, state.duration, f"{state.phase}  {state.range:6.1f} m  {state.time:6.1f} s")
+        away = "" if math.isnan(state.range) else f"  {state.range:6.1f} m"
+        self._show(state.time, state.duration, f"{state.phase}{away}  {state.time:6.1f} s")
 
 
 class VideoProgress(_Bar):
@@ -148,13 +149,16 @@ def waiting(text: str) -> Iterator[None]:
         yield
 
 
-ROWS = {  # key of the summary: what the table calls it
+ROWS = {  # key of a summary: what the table calls it; those that a vehicle's summary has are shown
     "docked": "docked",
+    "finished": "finished",
     "failure_text": "because",
     "attempts": "attempts",
+    "waypoints": "waypoints reached",
     "time": "time [s]",
     "miss_distance": "miss distance at the entrance [m]",
     "heading_error_deg": "heading error at the entrance [deg]",
+    "cross_track_rms": "distance from the track, rms [m]",
     "contact_impulse": "contact impulse [N s]",
     "peak_contact_force": "largest contact force [N]",
     "fixes_sent": "fixes sent",
@@ -164,17 +168,26 @@ ROWS = {  # key of the summary: what the table calls it
 }
 
 
-def table(summary: Mapping[str, Any]) -> None:
-    """Prints a summary as one table: the verdict, then the errors of the estimate by phase."""
-    table = Table("", "", title="docking trial", show_header=False)
+def show(summary: Mapping[str, Any]) -> None:
+    """Prints the summary of a run as one table, a column a vehicle: the verdict, then the errors of the estimate."""
+    several = summary.get("vehicles")
+    vehicles: Mapping[str, Mapping[str, Any]] = several or {"": summary}
+    missions = {str(values["mission"]) for values in vehicles.values()}
+    title = f"{missions.pop()} trial" if len(missions) == 1 else "run"
+    table = Table("", *vehicles, title=title, show_header=bool(several))
     for key, label in ROWS.items():
-        if summary[key] is not None:
-            table.add_row(label, _text(summary[key]))
-    for phase, quality in summary["estimate"].items():
-        error = f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}"
+        if any(values.get(key) is not None for values in vehicles.values()):
+            table.add_row(label, *(_text(values.get(key)) for values in vehicles.values()))
+    phases = dict.fromkeys(phase for values in vehicles.values() for phase in values["estimate"])
+    for phase in phases:
         where = "all phases" if phase == "all" else phase.replace("_", " ")
-        table.add_row(f"position rms [m], NEES per axis, {where}", error)
+        cells = (_errors(values["estimate"].get(phase)) for values in vehicles.values())
+        table.add_row(f"position rms [m], NEES per degree of freedom, {where}", *cells)
     Console(markup=False).print(table)  # units stand in brackets
+
+
+def _errors(quality: Mapping[str, Any] | None) -> str:
+    return f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}" if quality else ""
 
 
 def manoeuvres(found: Sequence[Figures]) -> None:

@@ -7,21 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
-from auvsim.data.variables import (
-    DTYPES,
+from auvsim.data.attributes import (
     FORMAT_VERSION,
-    READING,
-    ROOT_TABLES,
     RUN_ATTRIBUTES,
-    SIZES,
     STATUSES,
     STRUCTURE_ATTRIBUTES,
     VEHICLE_ATTRIBUTES,
-    VEHICLE_TABLES,
     AttributeSpec,
-    Table,
-    Variable,
 )
+from auvsim.data.variables import DTYPES, READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table, Variable
 
 if TYPE_CHECKING:
     from auvsim.data.log import Log
@@ -48,6 +42,8 @@ def check(log: "Log", where: str) -> None:
     for path, table in ROOT_TABLES.items():
         _check_holds(log, path, table, where)
     for path in log.groups:
+        if path.startswith("vehicles/") and path.split("/")[1] not in log.vehicles:
+            raise InputError(f"{where}: the group '{path}' is of no vehicle; there are {', '.join(log.vehicles)}")
         _check_group(log.groups[path], log.tables.get(path, {}), where, path)
     for name in {*log.groups["event"]["vehicle"].tolist()} - {"", *log.vehicles}:
         known = ", ".join(log.vehicles)

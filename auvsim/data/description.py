@@ -2,17 +2,8 @@
 
 from collections.abc import Mapping
 
-from auvsim.data.variables import (
-    READING,
-    ROOT_TABLES,
-    RUN_ATTRIBUTES,
-    SIZES,
-    STRUCTURE_ATTRIBUTES,
-    VEHICLE_ATTRIBUTES,
-    VEHICLE_TABLES,
-    AttributeSpec,
-    Table,
-)
+from auvsim.data.attributes import RUN_ATTRIBUTES, STRUCTURE_ATTRIBUTES, VEHICLE_ATTRIBUTES, AttributeSpec
+from auvsim.data.variables import READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table
 
 INTRODUCTION = """\
 # Log format 3

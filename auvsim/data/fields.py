@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 def content(log: "Log") -> Content:
     """The content of a log's file."""
     groups = {
-        path: {name: _field(variable, log.groups[path][name]) for name, variable in table.items()}
+        path: {name: field_of(variable, log.groups[path][name]) for name, variable in table.items()}
         for path, table in log.tables.items()
     }
     return Content(groups, {"": log.attributes, **log.group_attributes})
@@ -26,7 +26,7 @@ def content(log: "Log") -> Content:
 def empty(group: Group) -> dict[str, Field]:
     """The fields of a group without rows."""
     return {
-        name: _field(variable, np.zeros(group.shape(0, name), dtype=variable.array_type))
+        name: field_of(variable, np.zeros(group.shape(0, name), dtype=variable.array_type))
         for name, variable in group.table.items()
     }
 
@@ -53,7 +53,8 @@ def parts(found: Content, where: str) -> tuple[dict, dict, dict, dict]:
     return groups, tables, attributes, {path: dict(value) for path, value in found.attributes.items() if path}
 
 
-def _field(variable: Variable, values: NDArray[Any]) -> Field:
+def field_of(variable: Variable, values: NDArray[Any]) -> Field:
+    """The field of a variable, with what describes it as attributes."""
     texts = {"units": variable.units, "long_name": variable.long_name, "frame": variable.frame}
     attributes: dict[str, Any] = {name: text for name, text in texts.items() if text}
     if variable.labels:

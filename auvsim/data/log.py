@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
 from auvsim.data import convert, netcdf
+from auvsim.data.attributes import VERSIONS, WALL_TIME
 from auvsim.data.checks import check
 from auvsim.data.description import table_markdown
 from auvsim.data.fields import content, parts
-from auvsim.data.variables import VERSIONS, WALL_TIME, Variable
+from auvsim.data.variables import Variable
 
 Columns = dict[str, NDArray[Any]]
 Attributes = dict[str, str | int | float]
@@ -64,7 +65,8 @@ class Log:
         return StructureLog(self, name)
 
     def _instances(self, kind: str) -> tuple[str, ...]:
-        return tuple(path.split("/")[1] for path in self.group_attributes if path.startswith(f"{kind}/"))
+        paths = (path.split("/") for path in self.group_attributes)
+        return tuple(path[1] for path in paths if len(path) == 2 and path[0] == kind)
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ counts beside a trial that runs in half a second.
 
 import io
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
@@ -22,7 +22,7 @@ from auvsim.base.files import whole
 
 Attribute = str | int | float
 # Any file that HDF5 cannot make sense of ends in one of these, by where the damage is.
-UNREADABLE = (OSError, RuntimeError, KeyError, ValueError, TypeError, IndexError, AttributeError)
+UNREADABLE = (OSError, RuntimeError, LookupError, ValueError, TypeError, AttributeError, ArithmeticError, MemoryError)
 CHUNK = 1024  # rows of a chunk of a file that grows
 # Attributes by which HDF5 and NetCDF keep their books, and the mark of types that NetCDF does not have.
 _BOOKS = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Netcdf4Dimid", "_Netcdf4Coordinates"}
@@ -209,21 +209,24 @@ def _load_group(
     group: h5py.Group, path: str, groups: dict[str, Fields], attributes: dict[str, Mapping[str, Any]]
 ) -> None:
     """Adds the fields and attributes of a group and of those below it."""
-    if found := _attributes(group.attrs.items()):
+    if found := _attributes(group):
         attributes[path] = found
-    fields = {}
+    datasets = {}
     for name, item in group.items():
         if isinstance(item, h5py.Group):
             _load_group(item, f"{path}/{name}".lstrip("/"), groups, attributes)
-        elif isinstance(item, h5py.Dataset) and item.dtype != np.dtype(">f4"):
-            fields[name] = _load_field(item, name)
+        elif isinstance(item, h5py.Dataset):
+            datasets[name] = item
+    names = {_address(dataset.id): name for name, dataset in datasets.items()}
+    bare = np.dtype(">f4")  # the type of a dimension without coordinate, as `create` writes it
+    fields = {name: _load_field(item, names) for name, item in datasets.items() if item.dtype != bare}
     if fields:
         groups[path] = fields
 
 
-def _load_field(dataset: h5py.Dataset, name: str) -> Field:
+def _load_field(dataset: h5py.Dataset, names: Mapping[int, str]) -> Field:
     values = np.asarray((dataset.asstr() if h5py.check_string_dtype(dataset.dtype) else dataset)[...])
-    found = dict(dataset.attrs.items())
+    found = _attributes(dataset)
     mark = found.pop(_MARK, None)
     if mark == "bool":
         values = values.astype(bool)
@@ -233,15 +236,26 @@ def _load_field(dataset: h5py.Dataset, name: str) -> Field:
         if values.size and (values.min() < 0 or values.max() >= len(texts)):
             raise ValueError(f"'{dataset.name}' has a code without category")
         values = texts[values] if values.size else np.empty(values.shape, dtype=object)
-    references = found.get("DIMENSION_LIST", ())
-    names = tuple(str(dataset.file[axis[0]].name).rsplit("/", 1)[-1] for axis in references) or (name,)
-    return Field(names, values, _attributes(found.items()), coded=mark == "category")
+    return Field(_dimensions(dataset, names), values, found, coded=mark == "category")
 
 
-def _attributes(items: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+def _dimensions(dataset: h5py.Dataset, names: Mapping[int, str]) -> tuple[str, ...]:
+    """Names of the dimensions, by those of the group's datasets: the scales of each axis, or a coordinate itself."""
+    if "DIMENSION_LIST" not in dataset.attrs:
+        return (names[_address(dataset.id)],)
+    axes: Any = dataset.attrs["DIMENSION_LIST"]
+    # By addresses, since HDF5 searches the whole file for the name of what a reference points to.
+    return tuple(names[_address(h5py.h5r.dereference(axis[0], dataset.id))] for axis in axes)
+
+
+def _address(item: Any) -> int:
+    return h5py.h5o.get_info(item).addr
+
+
+def _attributes(item: h5py.Group | h5py.Dataset) -> dict[str, Any]:
     """Attributes as Python's own numbers and texts, without the books of HDF5 and NetCDF."""
+    values = {name: item.attrs[name] for name in item.attrs if name not in _BOOKS}
     return {
         name: value.item() if isinstance(value, np.generic | np.ndarray) and value.ndim == 0 else value
-        for name, value in items
-        if name not in _BOOKS
+        for name, value in values.items()
     }

@@ -15,11 +15,12 @@ import auvsim
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.reading import Reading
 from auvsim.data import netcdf
+from auvsim.data.attributes import FORMAT_VERSION, STATUSES, VERSIONS, WALL_TIME
 from auvsim.data.checks import check
 from auvsim.data.fields import empty, parts
 from auvsim.data.log import Log
 from auvsim.data.stream import Stream
-from auvsim.data.variables import FORMAT_VERSION, STATUSES, VERSIONS, WALL_TIME, Group
+from auvsim.data.variables import Group
 from auvsim.physics.truth import Truth
 
 PACKED = 4096  # rows after which a group is packed into arrays
@@ -100,7 +101,7 @@ class Recorder:
         A reading that was lost has NaN for the time it was received.
         """
         # A tuple, which unlike a list the garbage collector does not look through again and again.
-        self.append(self._sensors[vehicle, reading.sensor], (*reading[1:], *extra))
+        self.append(self._sensors[vehicle, reading.sensor], reading[1:] + extra)
 
     def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
         """Appends an event of a vehicle, or of the run as a whole with vehicle ""."""
@@ -151,7 +152,7 @@ class Recorder:
         rows = self._rows[group]
         if not rows:
             return
-        pack = _packed_truth if group.endswith("/truth") else _packed
+        pack = _packed_truth if group.split("/")[2:] == ["truth"] else _packed
         columns = pack(rows, self._tables[group], group)
         self._rows[group] = []
         if self._stream is not None:

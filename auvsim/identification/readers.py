@@ -34,7 +34,7 @@ def read(
     for path in paths:
         sources.append(Source(file=path.name, sha256=_hash(path)))
         ones, more = _signals(path, mapping, vehicle)
-        checks.signals(ones, limits.allocation.limit, limits.shaft_limit)
+        checks.signals(ones, limits.actuation.fin_limit, limits.actuation.shaft_limit)
         notes += more
         for one in ones:
             records, more = signals.records(one, step)

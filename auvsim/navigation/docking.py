@@ -106,7 +106,7 @@ class DockingNavigator:
         return wrap(first + sum(offsets) / len(offsets))
 
 
-def _docking(
+def navigator(
     setup: NavigatorSetup, kind: Callable[..., Any], base: DockingNoise, *, delayed: bool = True
 ) -> DockingNavigator:
     """A docking filter for a vehicle; what it assumes are the estimator's settings, never the sensors' draws."""
@@ -126,32 +126,32 @@ def _docking(
 
 def regular_ekf(setup: NavigatorSetup) -> Navigator:
     """The regular filter: knows neither delay nor current, with the noise that suits such a filter best."""
-    return _docking(setup, partial(PaperFilter, weights=None), REGULAR_NOISE, delayed=False)
+    return navigator(setup, partial(PaperFilter, weights=None), REGULAR_NOISE, delayed=False)
 
 
 def delay_only(setup: NavigatorSetup) -> Navigator:
     """Half of paper 1's filter: the delay buffer (sections 8 and 9), and no current."""
-    return _docking(setup, partial(PaperFilter, weights=None), REGULAR_NOISE)
+    return navigator(setup, partial(PaperFilter, weights=None), REGULAR_NOISE)
 
 
 def current_only(setup: NavigatorSetup) -> Navigator:
     """The other half: the current by eq. 11, with fixes taken as made when they arrive."""
-    return _docking(setup, PaperFilter, PAPER_NOISE, delayed=False)
+    return navigator(setup, PaperFilter, PAPER_NOISE, delayed=False)
 
 
 def paper(setup: NavigatorSetup) -> Navigator:
     """Paper 1's improved filter (sections 6 to 10), with the noises it recommends."""
-    return _docking(setup, PaperFilter, PAPER_NOISE)
+    return navigator(setup, PaperFilter, PAPER_NOISE)
 
 
 def augmented_ekf(setup: NavigatorSetup) -> Navigator:
     """The augmented extended Kalman filter in the delay buffer (paper 1, sections 8 and 12)."""
-    return _docking(setup, AugmentedFilter, _noise(setup.settings))
+    return navigator(setup, AugmentedFilter, _noise(setup.settings))
 
 
 def ukf(setup: NavigatorSetup) -> Navigator:
     """The augmented filter with sigma points instead of derivatives."""
-    return _docking(setup, partial(AugmentedFilter, transform="unscented"), _noise(setup.settings))
+    return navigator(setup, partial(AugmentedFilter, transform="unscented"), _noise(setup.settings))
 
 
 def imm(setup: NavigatorSetup) -> Navigator:
@@ -186,7 +186,7 @@ def _interacting(setup: NavigatorSetup, biases: Mapping[str, Bias], outliers: Ou
         initial=shares / shares.sum(),
         outliers=outliers,
     )
-    return _docking(setup, kind, replace(noise, biases={**compass, **biases, **noise.biases}))
+    return navigator(setup, kind, replace(noise, biases={**compass, **biases, **noise.biases}))
 
 
 def _noise(s: Any) -> DockingNoise:

@@ -12,8 +12,7 @@ class _Assumed(Settings):
 
     model: str = Field(
         default="condense",
-        description="planar model it assumes: condense (fitted to the vehicle in MuJoCo), a name in "
-        "models/<vehicle>/planar/, or the path of a .yaml",
+        description="planar model: condense (fitted to MuJoCo's vehicle), a name in models/<vehicle>/planar/, a .yaml",
     )
     model_speed: float = Field(
         default=1.0, gt=0, description="speed through the water at which the planar model is fitted [m/s]"

@@ -53,9 +53,13 @@ class Craft:
         actuators = [model.actuator(f"{name}/{channel}") for channel in vehicle.actuation.channels]
         joints = [int(actuator.trnid[0]) for actuator in actuators]
         self._controls = [int(actuator.id) for actuator in actuators]
-        self._angles, self._rates = model.jnt_qposadr[joints], model.jnt_dofadr[joints]
+        self._angles = model.jnt_qposadr[joints]
         # A velocity servo has no stiffness: its channel is a rate, any other's an angle.
-        self._turning = np.flatnonzero([actuator.biasprm[1] == 0.0 for actuator in actuators])
+        self._turning = [
+            (channel, int(self._angles[channel]), int(model.jnt_dofadr[joint]))
+            for channel, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
+            if actuator.biasprm[1] == 0.0
+        ]
         self._rotation = np.zeros(9)
         self._matrix = self._rotation.reshape(3, 3)
 
@@ -73,10 +77,9 @@ class Craft:
         self.position[:] = flip(position)
         self._quaternion[:] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
         self._velocity[:3] = flip(velocity)
-        turning = self._turning
-        fixed = np.setdiff1d(np.arange(len(channels)), turning)
-        self._qpos[self._angles[fixed]] = channels[fixed]
-        self._qvel[self._rates[turning]] = channels[turning]
+        self._qpos[self._angles] = channels
+        for channel, angle, rate in self._turning:
+            self._qpos[angle], self._qvel[rate] = 0.0, channels[channel]
         self._control[self._controls] = channels
 
     def command(self, channels: Sequence[float]) -> None:
@@ -107,7 +110,8 @@ class Craft:
         over_ground = nu[:3]
         over_ground[:] = over_ground.dot(self._matrix)
         actuators = self._qpos.take(self._angles)
-        actuators[self._turning] = self._qvel.take(self._rates[self._turning])
+        for channel, _, rate in self._turning:
+            actuators[channel] = self._qvel[rate]
         return Truth(
             time=time,
             position=position,

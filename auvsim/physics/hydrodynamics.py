@@ -15,7 +15,10 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip_matrix
 from auvsim.physics import fluid
 from auvsim.physics.forces import (
+    BRAKE,
+    CHANNEL,
     DENSITY,
+    DERIVED,
     FIN,
     FIN_KIND,
     HULL,
@@ -26,18 +29,23 @@ from auvsim.physics.forces import (
     RECORD,
     SLOT,
     STRIPS,
+    THRUSTER,
+    THRUSTER_KIND,
 )
 
 SEA_WATER = 1026.0  # density [kg/m3], as the REMUS-100 reference has it
+BRAKE_TIME = 0.02  # time in which a shaft faster than its motor's limits slows down [s]
 
 _KINDS = {"hull": (HULL_KIND, HULL), "fin": (FIN_KIND, FIN), "propeller": (PROPELLER_KIND, PROPELLER)}
+_KINDS |= {"thruster": (THRUSTER_KIND, THRUSTER)}
 _REQUIRED = {
     "hull": ("added_mass", "displaced_volume"),
     "fin": ("area", "lift_slope", "stall_angle"),
     "propeller": ("diameter", "thrust_coefficients", "torque_coefficients"),
+    "thruster": ("thrust", "size"),
 }
 _MATRICES = ("added_mass", "linear_damping", "quadratic_damping")
-_SIGNED = ("body_lift_x", "strip_x", "thrust_coefficients", "torque_coefficients", *_MATRICES)
+_SIGNED = ("body_lift_x", "reaction", "strip_x", "thrust_coefficients", "torque_coefficients", *_MATRICES)
 
 
 class Body(NamedTuple):
@@ -45,7 +53,7 @@ class Body(NamedTuple):
 
     index: int
     name: str
-    kind: str  # hull, fin or propeller
+    kind: str  # hull, fin, propeller or thruster
     fields: dict[str, Array]
 
 
@@ -102,6 +110,13 @@ def _check(index: int, name: str, fields: dict[str, Array]) -> Body:
             raise InputError(f"'{name}_{field}' is not symmetric")
         if np.linalg.eigvalsh(matrix + matrix.T).min() < -1e-9 * max(1.0, np.abs(matrix).max()):
             raise InputError(f"'{name}_{field}' is not positive semidefinite (M_A and D are positive here)")
+    if kind == "thruster" and fields.get("dead_band", np.zeros(1))[0] >= 1.0:
+        raise InputError(f"'{name}_dead_band' is {fields['dead_band'][0]:g}; full command is 1")
+    if fields.get("astern_loss", np.zeros(1))[0] > 1.0:
+        raise InputError(f"'{name}_astern_loss' is {fields['astern_loss'][0]:g}; it is a share, at most 1")
+    for field in ("torque_limit", "power_limit"):
+        if field in fields and fields[field][0] > 0.0 >= fields["torque_coefficients"][0]:
+            raise InputError(f"'{name}_{field}' needs a positive K_Q0 in '{name}_torque_coefficients'")
     if np.any(fields.get("quadratic_damping", np.zeros((6, 6))).diagonal() < 0):
         raise InputError(f"'{name}_quadratic_damping' has a negative diagonal (D is positive here)")
     return Body(index, name, kind, fields)
@@ -115,7 +130,38 @@ def _record(body: Body, slot: int, density: float) -> Array:
     for field, value in body.fields.items():
         value = flip_matrix(value) if field in _MATRICES else value
         record[table[field][0] : table[field][0] + value.size] = value.ravel()
+    if body.kind == "hull":
+        for field, value in _strips(body.fields).items():
+            at = {**HULL, **DERIVED}[field][0]
+            record[at : at + value.size] = value
     return record
+
+
+def _strips(fields: dict[str, Array]) -> dict[str, Array]:
+    """The cylinders along a hull's axis whose volume the surface cuts, and how deep none is cut.
+
+    Lengths are from the strips' spacing, diameters from their areas, volumes in proportion, sloped along the axis so
+    that their centre is the origin. A hull without strips, or whose strips do not allow that, is one cylinder as long
+    as thick.
+    """
+    volume = fields["displaced_volume"][0]
+    x, area = fields.get("strip_x", np.zeros(0)), fields.get("strip_area", np.zeros(0))
+    if x.size > 1 and np.all(np.diff(x) > 0) and np.all(area > 0):
+        length = np.gradient(x)
+        radius = 0.5 * area / length
+        share = radius**2 * length
+        share *= 1.0 - x * (share @ x) / (share @ x**2)
+        if np.all(share > 0):
+            reach = 1.5 * np.max(np.abs(x) + np.hypot(radius, 0.5 * length))  # waves may be as steep as 1 in 2
+            return {
+                "strip_volume": volume * share / share.sum(),
+                "strip_radius": radius,
+                "strip_half_length": 0.5 * length,
+                "reach": np.array([reach]),
+            }
+    radius = np.cbrt(volume / (2.0 * np.pi))
+    one = np.array([radius])
+    return {"strip_volume": np.array([volume]), "strip_radius": one, "strip_half_length": one, "reach": 1.5 * one}
 
 
 def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
@@ -145,6 +191,11 @@ def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
         base = model.body_rootid[body.index]
         slot = slots.setdefault(model.body(base).name, fluid.WATER * len(slots))
         model.body_user[body.index, :RECORD] = _record(body, slot, density)
+        if body.kind == "propeller":
+            armature = model.dof_armature[model.body_dofadr[body.index]]
+            model.body_user[body.index, BRAKE] = armature / BRAKE_TIME
+        elif body.kind == "thruster":
+            model.body_user[body.index, CHANNEL] = _channel(model, body.name)
     if model.nuserdata < fluid.WATER * len(slots):
         raise InputError(
             f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}"
@@ -163,6 +214,8 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
         raise InputError(
             "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up"
         )
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     for body in elements:
         base, weld = model.body_rootid[body.index], model.body_weldid[body.index]
         free = model.body_dofnum[base] == 6 and model.jnt_type[model.body_jntadr[base]] == mujoco.mjtJoint.mjJNT_FREE
@@ -172,11 +225,50 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
             )
         if body.kind == "propeller" and not _on_a_shaft(model, body.index):
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
+        if body.kind == "thruster":
+            _check_place(model, data, body)
         if body.kind == "hull" and model.body_simple[base]:
             raise InputError(
                 f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of"
                 " mass is its origin; move the centre of mass or add a hinged body"
             )
+
+
+def _channel(model: mujoco.MjModel, name: str) -> int:
+    """Where the command of a thruster is, as its record holds it.
+
+    Raises:
+        InputError: it has no actuator of its name, or one that pushes by itself.
+    """
+    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
+    if index < 0:
+        raise InputError(f"thruster '{name}' needs an actuator of its name, which takes its command")
+    if model.actuator_gainprm[index].any() or model.actuator_biasprm[index].any():
+        raise InputError(f"actuator '{name}' must have gainprm and biasprm 0: the water gives the thruster's force")
+    return int(model.actuator_actadr[index]) if model.actuator_actnum[index] else -1 - index
+
+
+def _check_place(model: mujoco.MjModel, data: mujoco.MjData, body: Body) -> None:
+    """Refuses a thruster that is off its vehicle: outside the box round the vehicle's geoms by more than its size."""
+    root = model.body_rootid[body.index]
+    geoms = [
+        i
+        for i in range(model.ngeom)
+        if model.body_rootid[model.geom_bodyid[i]] == root and model.geom_bodyid[i] != body.index
+    ]
+    if not geoms:
+        return
+    R = data.xmat[root].reshape(3, 3)
+    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
+    points = [
+        data.geom_xpos[i]
+        + (model.geom_aabb[i, :3] + corners * model.geom_aabb[i, 3:]) @ data.geom_xmat[i].reshape(3, 3).T
+        for i in geoms
+    ]
+    box, place = np.concatenate(points) @ R, data.xpos[body.index] @ R
+    over = np.maximum(box.min(axis=0) - place, place - box.max(axis=0)).max()
+    if over > body.fields["size"][0]:
+        raise InputError(f"thruster '{body.name}' is {over:.3g} m outside the hull; at most its size is allowed")
 
 
 def _on_a_shaft(model: mujoco.MjModel, body: int) -> bool:

@@ -100,6 +100,8 @@ class World:
         self._recorder = ContactRecorder(model, self.data, self.vehicles)
         self._near_flags = int(model.opt.disableflags)
         self._far_flags = self._near_flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
+        self._fleet = tuple(self._craft.values())
+        self._most_ticks = max(1, round(LOOKOUT / model.opt.timestep))
         self._unplaced = set(self.vehicles)
 
     @property
@@ -164,7 +166,7 @@ class World:
             ahead: how far from now the expansion is taken [s]; half the time for which it will serve makes its error
                 second order in that time.
         """
-        for craft in self._craft.values():
+        for craft in self._fleet:
             craft.refresh_water(self.current, self.data.time + ahead)
 
     def command(self, vehicle: str, channels: Sequence[float]) -> None:
@@ -183,14 +185,13 @@ class World:
         """
         if self._unplaced:
             raise InputError(f"vehicles without a place: {', '.join(sorted(self._unplaced))}; place them first")
-        step = self._options.timestep
         if not self.current.steady_uniform:
-            self.refresh_water(0.5 * ticks * step)
-        most = max(1, round(LOOKOUT / step))
-        while ticks > 0:
-            piece = min(ticks, most)
-            self._advance(piece)
-            ticks -= piece
+            self.refresh_water(0.5 * ticks * self._options.timestep)
+        most = self._most_ticks
+        while ticks > most:
+            self._advance(most)
+            ticks -= most
+        self._advance(ticks)
 
     def _advance(self, ticks: int) -> None:
         near = self._is_near()
@@ -202,13 +203,13 @@ class World:
                 self._watch()
         else:
             self._step(ticks)
-        for craft in self._craft.values():
+        for craft in self._fleet:
             if not float(craft.speeds.dot(craft.speeds)) < 1e6:
                 raise DivergenceError(self._diagnosis(craft))
 
     def _is_near(self) -> bool:
         """Whether any vehicle may touch something soon."""
-        places = [craft.position.tolist() for craft in self._craft.values()]
+        places = [craft.position.tolist() for craft in self._fleet]
         depth = self.terrain.depth
         for x, y, z in places:
             if z < NEAR_FLOOR - depth(x, -y):

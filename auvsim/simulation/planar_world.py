@@ -15,7 +15,7 @@ from estimators.planar.model import PlanarParameters, PlanarProcess
 
 
 class PlanarWorld:
-    """One vehicle that moves as `PlanarProcess`, level and at constant depth; a world without structures for `Simulation`.
+    """One vehicle that moves as `PlanarProcess`, level and at constant depth, as a world without structures.
 
     Fins and shaft are at once where they are commanded to be. There is no dock to touch.
 
@@ -52,6 +52,10 @@ class PlanarWorld:
     def time(self) -> float:
         """Time since the start [s]."""
         return self._ticks / self._rate
+
+    def reset(self) -> None:
+        """Back to time zero; the noise goes on."""
+        self._ticks = 0
 
     def place(self, vehicle: str, position: Array, heading: float, speed: float, channels: Sequence[float]) -> None:
         """Resets to time zero with the vehicle at a place, moving ahead through the water; the noise goes on.

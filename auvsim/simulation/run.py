@@ -14,6 +14,7 @@ from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
 from auvsim.base import yaml_text
 from auvsim.base.errors import DivergenceError
+from auvsim.base.frames import Array
 from auvsim.base.randomness import stream
 from auvsim.base.reading import Reading
 from auvsim.data.log import Log
@@ -141,12 +142,11 @@ class Simulation:
         self.progress_ticks = round(6.0 * rates.control)
         self._listeners = listeners(self.world.current)
         self.ticks = 0
-        for agent in self.agents:
-            start = scenario.vehicles[agent.name].start
-            place = np.array(scenario.start_position(agent.name))
-            channels = agent.vehicle.actuation.allocate(agent.commands)
-            self.world.place(agent.name, place, math.radians(start.heading_deg), start.speed, channels)
-        self.truths: dict[str, Truth] = {agent.name: self.world.truth(agent.name) for agent in self.agents}
+        self.truths: dict[str, Truth] = {}
+        for name, settings in scenario.vehicles.items():
+            start = settings.start
+            place = np.array(scenario.start_position(name))
+            self.place(name, place, math.radians(start.heading_deg), start.speed)
         self.log = self._recorder(seed, trial, path) if record else Unrecorded()
         self._record_truths()
 
@@ -159,6 +159,20 @@ class Simulation:
     def over(self) -> bool:
         """Whether every vehicle has come to the end of its mission."""
         return all(agent.over for agent in self.agents)
+
+    def place(self, name: str, position: Array, heading: float, speed: float) -> None:
+        """Puts a vehicle at another start, before the first step; its actuators already do what is demanded.
+
+        Args:
+            name: of the vehicle.
+            position: (3,) NED [m].
+            heading: [rad].
+            speed: through the water [m/s].
+        """
+        agent = next(agent for agent in self.agents if agent.name == name)
+        channels = agent.vehicle.actuation.allocate(agent.commands)
+        self.world.place(name, position, heading, speed, channels)
+        self.truths[name] = self.world.truth(name)
 
     def step(self) -> None:
         """One control period: physics, sensors, network, estimators, missions, control.
@@ -247,22 +261,12 @@ class Simulation:
         if scenario.datum.latitude is not None and scenario.datum.longitude is not None:
             attributes |= {"latitude": scenario.datum.latitude, "longitude": scenario.datum.longitude}
         of_groups = {f"vehicles/{agent.name}": self._attributes_of(agent) for agent in self.agents}
-        of_groups |= {
-            f"structures/{name}": {"model": settings.model, **self._places[name].structure.dimensions}
-            | {
-                "north": settings.north,
-                "east": settings.east,
-                "depth": settings.depth,
-                "heading": settings.pose.heading,
-            }
-            for name, settings in scenario.structures.items()
-        }
+        of_groups |= {f"structures/{name}": self._attributes_of_structure(name) for name in scenario.structures}
         return Recorder(groups, attributes, of_groups, path)
 
     def _attributes_of(self, agent: Agent) -> dict[str, Any]:
         """What the log says of a vehicle as a whole."""
         settings = self.scenario.vehicles[agent.name]
-        forward, starboard, down = settings.sensors.usbl.transceiver
         return {
             "model": settings.model,
             "nose": agent.vehicle.nose,
@@ -273,9 +277,21 @@ class Simulation:
             "mission_settings": yaml_text.dump(settings.mission.model_dump(mode="json")),
             "dock": agent.mission.dock.name if agent.mission.dock else "",
             "usbl_structure": agent.dock or "",
-            "transceiver_forward": forward,
-            "transceiver_starboard": starboard,
-            "transceiver_down": down,
+        }
+
+    def _attributes_of_structure(self, name: str) -> dict[str, Any]:
+        """What the log says of a structure; its transceiver is that of the first vehicle which it serves."""
+        settings = self.scenario.structures[name]
+        place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
+        served = next((agent.name for agent in self.agents if agent.dock == name), None)
+        transceiver = self.scenario.vehicles[served].sensors.usbl.transceiver if served else ()
+        axes = ("transceiver_forward", "transceiver_starboard", "transceiver_down")
+        return {
+            "model": settings.model,
+            **place,
+            "heading": settings.pose.heading,
+            **self._places[name].structure.dimensions,
+            **dict(zip(axes, transceiver, strict=False)),
         }
 
 

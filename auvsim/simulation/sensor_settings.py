@@ -77,8 +77,7 @@ def _other(name: str, values: Any) -> Settings:
     kind = values.get("kind") if isinstance(values, dict) else None
     if kind is None:
         known = [*SensorSettings.model_fields]
-        raise ValueError(f"{name}: unknown key; {schema.suggestion(name, SensorSettings, known)}, and any other "
-                         "sensor by a name of its own with its `kind`")  # fmt: skip
+        raise schema.UnknownKey(name, known, "; any other sensor has a name of its own and a `kind`")
     model = OwnSensor if ":" in str(kind) else OTHERS.get(str(kind))
     if model is None:
         raise ValueError(f"{name}.kind: no sensor '{kind}'; there are {', '.join(OTHERS)}, package.module:Class")

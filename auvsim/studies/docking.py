@@ -11,8 +11,7 @@ from rich.table import Table
 
 from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.studies.trials import Summary
-from auvsim.studies.trials import docking_trial
+from auvsim.studies.trials import Summary, docking_trial
 
 LATER = 3  # attempts that the default guidance has
 

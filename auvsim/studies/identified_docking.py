@@ -22,10 +22,9 @@ from auvsim.analysis.statistics import bootstrap_rms_ratio
 from auvsim.base.randomness import stream
 from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification.fit import DEFAULT_FREE, with_values
-from auvsim.studies.trials import Summary
 from auvsim.physics import planar_sets
 from auvsim.physics.planar_fit import fit_planar_model
-from auvsim.studies.trials import docking_trial
+from auvsim.studies.trials import Summary, docking_trial
 from estimators.planar.model import PlanarParameters
 
 MODELS = ("fitted", "identified", "wrong")

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -60,10 +61,17 @@ def models_folder() -> Path:
 
 
 def _read(path: Path) -> str:
+    """Text of a file, which is read again when it has changed."""
     try:
-        return path.read_text(encoding="utf-8")
+        state = path.stat()
+        return _text(path, state.st_mtime_ns, state.st_size)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"model {path}: {error}") from None
+
+
+@lru_cache(maxsize=64)
+def _text(path: Path, modified: int, size: int) -> str:
+    return path.read_text(encoding="utf-8")
 
 
 def find(kind: str, name: str) -> Path:

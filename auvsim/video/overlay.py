@@ -1,5 +1,6 @@
 """Text and flat shapes on a finished picture: names of views and of what is in them, banners."""
 
+import math
 from functools import lru_cache
 from pathlib import Path
 from typing import NamedTuple
@@ -7,8 +8,7 @@ from typing import NamedTuple
 import matplotlib
 import numpy as np
 from matplotlib.colors import to_rgb
-from matplotlib.ft2font import FT2Font
-from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
 
 from auvsim.video.canvas import Box, Picture
 from auvsim.video.layer import Colour
@@ -33,37 +33,27 @@ def rgb(colour: Colour | str) -> Rgb:
     return round(255 * red), round(255 * green), round(255 * blue)
 
 
-@lru_cache(maxsize=1)
-def _fonts() -> tuple[FT2Font, FT2Font]:
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
-    return FT2Font(str(folder / "DejaVuSans.ttf")), FT2Font(str(folder / "DejaVuSans-Bold.ttf"))
-
-
-@lru_cache(maxsize=512)
-def _mask(text: str, size: float, bold: bool) -> tuple[NDArray[np.float32], int]:
-    """Coverage (height, width) of a line of text, 0 to 1, and how much of it is below the baseline [pixels]."""
-    font = _fonts()[bold]
-    font.set_size(size, 72)
-    font.set_text(text, 0.0)
-    font.draw_glyphs_to_bitmap(antialiased=True)
-    return np.array(font.get_image(), dtype=np.float32) / 255.0, round(font.get_descent() / 64.0)
+@lru_cache
+def _font(size: float, bold: bool) -> ImageFont.FreeTypeFont:
+    name = "DejaVuSans-Bold.ttf" if bold else "DejaVuSans.ttf"
+    return ImageFont.truetype(str(Path(matplotlib.get_data_path()) / "fonts" / "ttf" / name), size)
 
 
 def text_width(text: str, style: Style) -> int:
     """Width of a line of text [pixels]."""
-    return _mask(text, style.size, style.bold)[0].shape[1] if text else 0
+    return math.ceil(_font(style.size, style.bold).getbbox(text, anchor="ls")[2])
 
 
 def write(picture: Picture, text: str, x: int, baseline: int, style: Style) -> None:
-    """Writes a line of text; what does not fit into the picture is left out."""
-    if not text:
-        return
-    mask, below = _mask(text, style.size, style.bold)
-    top = baseline + below - mask.shape[0]
-    left, skipped = max(x, 0), max(-top, 0)
-    part = picture[max(top, 0) : max(top + mask.shape[0], 0), left : max(x + mask.shape[1], 0)]
-    cover = mask[skipped : skipped + part.shape[0], left - x : left - x + part.shape[1], np.newaxis]
-    part[:] = part + cover * (np.array(style.colour, dtype=np.float32) - part)
+    """Writes a line of text from `x` on its baseline; what does not fit into the picture is left out."""
+    font = _font(style.size, style.bold)
+    left, top, right, bottom = font.getbbox(text, anchor="ls")
+    column, row = max(x + math.floor(left), 0), max(baseline + math.floor(top), 0)
+    part = picture[row : max(baseline + math.ceil(bottom), 0), column : max(x + math.ceil(right), 0)]
+    if part.size:
+        image = Image.fromarray(part)
+        ImageDraw.Draw(image).text((x - column, baseline - row), text, style.colour, font, anchor="ls")
+        part[:] = np.asarray(image)
 
 
 def shortened(text: str, style: Style, room: float) -> str:

@@ -141,6 +141,13 @@ def record(kept: Recorder, vehicle: str, waypoints=GO_AROUND, seed=0, speed=1.5)
     kept.append("network/messages", (1.0, np.nan, "dock", vehicle, "usbl", 128, "lost"))
 
 
+def long_run(kept: Recorder) -> Log:
+    """The log of a vehicle of which 20 000 truths are recorded, in several packs of rows."""
+    for tick in range(20_000):
+        kept.truth("remus100", truth(0.1 * tick, (tick, 0, 5)))
+    return kept.finish("complete")
+
+
 def _from_dock(along, cross, down=0.0):
     return rotation(0.0, 0.0, DOCK_HEADING) @ np.array([along, cross, down]) + np.array([0.0, 0.0, DOCK_DEPTH])
 

@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 from typing import NamedTuple
 
-from auvsim import log, scenario
-from auvsim.trial import run_trial
+from auvsim.data import log
+from auvsim.simulation import scenario
+from auvsim.simulation.run import run as run_scenario
 
 HERE = Path(__file__).parent
 START = re.compile(r"(start:.*?\brange: )([0-9.]+)(.*?\bheading_deg: )([-0-9.]+)", re.DOTALL)  # of the vehicle
@@ -42,4 +43,4 @@ def run(case: Case, path: Path, *, shift: float = 0.0, duration: float | None = 
         text = START.sub(lambda m: f"{m[1]}{float(m[2]) + shift!r}{m[3]}{float(m[4]) + shift!r}", text, count=1)
     if duration is not None:
         text = re.sub(r"(?m)^duration: [0-9.]+", f"duration: {duration}", text)
-    log.write(run_trial(scenario.from_yaml(text, case.file), seed=case.seed, trial=case.trial), path)
+    log.write(run_scenario(scenario.from_yaml(text, case.file), seed=case.seed, trial=case.trial), path)

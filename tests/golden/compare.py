@@ -8,55 +8,38 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from auvsim.data.log import read
+
 from . import names
 
 Contents = dict[str, NDArray[Any]]  # arrays and attributes by path, see `names`
-VERSION, OLD = "@format_version", 2
+VERSION = "@format_version"
 USAGE = "usage: python -m tests.golden.compare {DIR_A DIR_B | record DIR}"
-BARE = b"This is a netCDF dimension but not a netCDF variable"
 
 
 def load(path: Path) -> Contents:
-    """Every array of every group of a NetCDF-4 file, at any depth, and the attributes of the groups."""
-    found: Contents = {}
-
-    def visit(name: str, item: h5py.Group | h5py.Dataset) -> None:
-        if isinstance(item, h5py.Group):
-            found.update({f"{name}@{key}": np.asarray(value) for key, value in item.attrs.items()})
-        elif not bytes(item.attrs.get("NAME", b"")).startswith(BARE):
-            found[name] = np.asarray((item.asstr() if h5py.check_string_dtype(item.dtype) else item)[...])
-
+    """Every array of every group of a log, and the attributes of the groups; of earlier formats as they are read."""
+    log = read(path)
+    found = {f"{group}/{name}": values for group, columns in log.groups.items() for name, values in columns.items()}
+    for group, attributes in ({"": log.attributes} | log.group_attributes).items():
+        found |= {f"{group}@{name}": np.asarray(value) for name, value in attributes.items()}
     with h5py.File(path, "r") as file:
-        visit("", file)
-        file.visititems(visit)
+        found[VERSION] = np.asarray(file.attrs["format_version"])
     return found
 
 
-def old_form(contents: Contents) -> Contents:
-    """A log under the names of format 2, whichever it has; what only newer ones hold keeps its own."""
-    if contents[VERSION] <= OLD:
-        return contents
-    left, found = dict(contents), {}
-    for old, new in names.RENAMED.items():
-        if isinstance(new, tuple):
-            found[old] = np.stack([left.pop(path) for path in new], axis=-1)
-            continue
-        moved = [path for path in left if names.below(path, new)]
-        found |= {old + path[len(new) :]: left.pop(path) for path in moved}
-    return left | found
-
-
 def differences(a: Contents, b: Contents) -> list[str]:
-    """A line for each array or attribute of two logs that is not the same bit for bit, under the names of format 2."""
+    """A line for each array or attribute of two logs that is not the same bit for bit."""
     ignored = set(names.FREE)
     if a[VERSION] != b[VERSION]:
         ignored |= {*names.NEW, *names.CHANGED}
     first, second = (
-        {path: value for path, value in old_form(log).items() if not any(names.below(path, name) for name in ignored)}
+        {path: value for path, value in log.items() if not any(names.below(path, name) for name in ignored)}
         for log in (a, b)
     )
-    found = [f"{path}: only in the first" for path in first if path not in second]
-    found += [f"{path}: only in the second" for path in second if path not in first]
+    # A sensor that the vehicle lacks had an empty group once.
+    found = [f"{path}: only in the first" for path in first if path not in second and first[path].size]
+    found += [f"{path}: only in the second" for path in second if path not in first and second[path].size]
     common = [path for path in first if path in second and not _same(first[path], second[path])]
     return found + [f"{path}: {_how(first[path], second[path])}" for path in common]
 

@@ -1,19 +1,33 @@
-"""Where what a log of format 2 holds is found in a log of today's format.
+"""What a log of today holds that one of an earlier format does not, or holds otherwise.
 
+Logs of every format are compared as `auvsim.data.log.read` gives them: what only has another name or place is equal.
 A path is `group/variable`; an attribute of a group is `group@attribute`, one of the file `@attribute`.
 """
 
-# Old path to new; an entry also moves all that stands below its path, and the first entry that fits a new path counts.
-# Several new paths are the columns of the old variable in turn. What no entry names has kept its path.
-RENAMED: dict[str, str | tuple[str, ...]] = {}
+# Groups with all below them, variables and attributes that no log of formats 1 and 2 has.
+NEW: tuple[str, ...] = (
+    "vehicles/remus100/measurements",
+    "vehicles/remus100@length",
+    "vehicles/remus100@estimator",
+    "vehicles/remus100@controller",
+    "vehicles/remus100@mission_settings",
+    "vehicles/remus100@usbl_structure",
+    "structures/dock@latched",
+    "network/messages",
+)
 
-# New paths, groups with all below them, that no log of format 2 has.
-NEW: tuple[str, ...] = ()
+# Paths whose values differ, each with the reason.
+CHANGED: dict[str, str] = {
+    "@scenario": "the full form; the text of the old one is kept in converted logs",
+    "vehicles/remus100@model": "converted logs know it by its file's stem",
+    "structures/dock@throat_length": "earlier logs did not have it; drawings took 0.6 m",
+    "vehicles/remus100/contact/other": "earlier logs did not say what was touched",
+    "vehicles/remus100/estimate/position": "its depth: one alpha-beta filter smooths it now; 2e-14 m at most",
+    "vehicles/remus100@dock": "a manoeuvre has no dock of its own; converted logs name the one that was there",
+    "event/vehicle": "earlier logs had one vehicle, and did not say which events are of the run",
+}
 
-# Old paths whose value has another form now, each with the reason.
-CHANGED: dict[str, str] = {}
-
-# What may differ between two runs of the same trial: wall-clock time and versions.
+# What may differ between two runs of the same scenario: wall-clock time and versions.
 FREE = ("@wall_time", "@format_version", "@auvsim_version", "@mujoco_version", "@numpy_version", "@numba_version")
 
 

@@ -59,6 +59,16 @@ def test_a_fleet_is_the_same_as_composed_anew() -> None:
         assert scene.poses == poses
 
 
+def test_a_pillar_stands_on_the_floor_below_its_own_structure() -> None:
+    pose = Pose(north=120.7, east=-33.1, depth=17.3, heading=2.2)
+    model = scenes.scene({}, {"dock": ("dock", pose)}, WorldSettings(sea_floor=31.0), 100.0).model
+    pillar = model.geom("dock:pillar")
+    behind = 1.03923 + 0.3  # the cone's end and 0.3 m more [m]
+    north, east = 120.7 + behind * np.cos(2.2), -33.1 + behind * np.sin(2.2)
+    assert pillar.pos == pytest.approx([north, -east, -0.5 * (17.3 + 1.6 + 31.0)], abs=1e-9)
+    assert pillar.size[1] == pytest.approx(0.5 * (31.0 - 17.3 - 1.6), abs=1e-9)
+
+
 def test_a_model_file_that_changes_makes_another_scene(tmp_path) -> None:
     path = tmp_path / "mine.xml"
     text = (library.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")

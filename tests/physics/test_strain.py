@@ -149,7 +149,7 @@ def flow():
 
 
 def test_the_flow_solution_knows_the_added_masses(flow):
-    """Two closed forms that the pressure integral must find before it may judge: Munk's moment and rho V + A at rest."""
+    """Two closed forms that the pressure must give before it may judge: Munk's moment, and rho V + A at rest."""
     V = np.array([1.5, 0.1, -0.05])
     still = flow.force(V, np.zeros((3, 3)), np.zeros(3))
     assert still == pytest.approx([0, 0, 0, *np.cross(lamb() * V, V)], abs=1e-5)

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
+from auvsim.simulation.trial import run_trial
 from rich.console import Console
 
 from auvsim.missions.docking.metrics import estimate_errors
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
 from auvsim.studies.comparison import CELLS, Options, run_one, run_study, score, table
 from estimators.core.consistency import interval
 

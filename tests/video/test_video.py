@@ -380,9 +380,16 @@ def test_text_is_as_wide_as_it_says() -> None:
     overlay.write(picture, "123 m", 50, 30, style)
     columns = np.flatnonzero(picture.any(axis=(0, 2)))
     assert 50 <= columns[0] <= columns[-1] < 50 + width
+    rows = np.flatnonzero(picture.any(axis=(1, 2)))
+    assert abs(rows[-1] - 29) <= 1  # digits stand on the baseline
+    assert abs(rows[-1] - rows[0] + 1 - 0.73 * style.size) < 1.5  # and DejaVu's are 0.73 of the size high
     assert picture.max() == 255
     for x, baseline in ((-20, 30), (180, 30), (50, 5), (50, 44), (-500, 30), (50, -90), (900, 900)):
         overlay.write(picture, "123 m", x, baseline, style)
+    cut, whole = np.zeros((2, 40, 200, 3), np.uint8)
+    overlay.write(cut, "123 m", -20, 35, style)
+    overlay.write(whole, "123 m", 100, 30, style)
+    assert np.array_equal(cut[10:, : width - 20], whole[5:-5, 120 : 100 + width])  # cut at the edge, not moved
 
 
 def test_a_failed_video_leaves_nothing(log: logs.Log, tmp_path: Path) -> None:

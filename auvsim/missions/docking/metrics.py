@@ -113,5 +113,3 @@ def _failure(log: VehicleLog) -> tuple[str, str | None]:
 def end_of(log: VehicleLog) -> float:
     """The last time that anything was logged as it happened [s]."""
     return max(float(log[group]["time"].max(initial=0.0)) for group in ("truth", "mission", "command", "event"))
-
-
