@@ -22,7 +22,7 @@ def wild(timestep=0.01, integrator="implicitfast", factor=1.0):
 
 @pytest.mark.parametrize("factor", [1.0, -1.0, 100.0, 1e6])
 def test_forces_are_finite_and_take_energy(factor):
-    model, data = wild(factor=factor)
+    _, data = wild(factor=factor)
     assert np.all(np.isfinite(data.qfrc_passive))
     assert np.all(np.isfinite(data.qacc))
     assert data.qfrc_passive[:6] @ data.qvel[:6] < 0.0
