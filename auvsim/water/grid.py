@@ -52,9 +52,8 @@ class Grid:
         found = grid_file.read(settings)
         last = float(found.axes[0][-1]) - settings.start
         if settings.outside == "refuse" and found.axes[0].size > 1 and last < duration:
-            raise InputError(
-                f"{settings.file}: {last:g} s of currents from the start on, {duration:g} s are needed; or set outside: hold"
-            )
+            text = f"{last:g} s of currents from the start on, {duration:g} s are needed; or set outside: hold"
+            raise InputError(f"{settings.file}: {text}")
         return cls(found.axes, found.velocity, settings.outside, settings.start)
 
     def _weights(self, axis: int, at: float) -> tuple[int, Array]:
