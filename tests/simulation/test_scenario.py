@@ -50,8 +50,8 @@ def message(values: dict, **places: str) -> str:
         (
             "current",
             {"speed": 0.2},
-            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, waves, "
-            "grid, sum",
+            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, "
+            "waves, grid, sum",
         ),
         ("current.kind", "unifrm", None),
         ("current.terms", None, None),
