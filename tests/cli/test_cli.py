@@ -1,6 +1,5 @@
 """The command line: what it takes, what it leaves on disk, how it fails. The trial itself is a stand-in here."""
 
-import importlib
 import json
 import os
 import signal
@@ -8,7 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -79,17 +78,15 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
             progress(1, 2)
         Path(path).write_bytes(b"video")
 
-    fakes = {
-        "auvsim.simulation.run": {"run": run},
-        "auvsim.analysis.plots": {"track": picture, "estimates": picture},
-        "auvsim.video": {"render": render, "DrawingError": DrawingError},
-    }
-    for name, contents in fakes.items():
-        module = ModuleType(name)
-        module.__dict__.update(contents)
-        monkeypatch.setitem(sys.modules, name, module)
-        package, _, attribute = name.rpartition(".")
-        monkeypatch.setattr(importlib.import_module(package), attribute, module, raising=False)
+    import auvsim.analysis.plots
+    import auvsim.simulation.run
+    import auvsim.video
+
+    monkeypatch.setattr(auvsim.simulation.run, "run", run)
+    monkeypatch.setattr(auvsim.analysis.plots, "track", picture)
+    monkeypatch.setattr(auvsim.analysis.plots, "estimates", picture)
+    monkeypatch.setattr(auvsim.video, "render", render)
+    monkeypatch.setattr(auvsim.video, "DrawingError", DrawingError)
     monkeypatch.setattr(fluid, "is_warm", lambda: True)
     return recorder
 
