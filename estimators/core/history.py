@@ -55,7 +55,7 @@ class Filter(Protocol[State]):
     """What a history replays. States are immutable and carry all that the next node needs."""
 
     def start(self, nodes: Sequence[Node[State]], index: int) -> State | None:
-        """First state, at a node with measurements; None if they do not suffice. Neighbours may be read only."""
+        """First state, at a node; None if its measurements do not suffice. Neighbours may be read only."""
         ...
 
     def predict(self, state: State, u: Input, duration: float) -> State:
@@ -167,7 +167,7 @@ class History(Generic[State]):
             before = nodes[index - 1] if index else None
             try:
                 if before is None or before.state is None:
-                    node.state = filter.start(nodes, index) if node.measurements else None
+                    node.state = filter.start(nodes, index)
                 else:
                     state = filter.predict(before.state, before.input, node.time - before.time)
                     node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
@@ -210,7 +210,7 @@ class History(Generic[State]):
         self.reinitialised += not node.failed
         node.failed = True
         try:
-            node.state = self._filter.start(self.nodes, index) if node.measurements else None
+            node.state = self._filter.start(self.nodes, index)
         except (NotFiniteError, NotPositiveDefiniteError):
             node.state = None
 
