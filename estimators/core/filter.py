@@ -10,7 +10,7 @@ from estimators.core.errors import ParameterError
 from estimators.core.history import Input, Node
 from estimators.core.outliers import Outliers
 from estimators.core.outliers import correct as correct_mixture
-from estimators.core.recovery import PROBABLE, REMEMBERED, OpenedRecovery, Recovery, Rejected
+from estimators.core.recovery import PROBABLE, REMEMBERED, Readmission, Recovery, Rejected
 from estimators.core.types import (
     NO_MODEL,
     Gaussian,
@@ -47,7 +47,7 @@ class ModelFilter:
     remembered. If the filter itself is wrong, the measurements of that source that follow disagree with it but agree
     with each other; then `recovery` sets it right by them. A lone outlier moves nothing. The gate widens while
     measurements are missing: one that comes after a rejected one and is inside the gate, but outside its inner 95 %, is
-    compared too. After four rejected in a row that never agree, the next one is taken with the last of them.
+    compared too.
 
     Args:
         process: How the state moves.
@@ -67,7 +67,7 @@ class ModelFilter:
         *,
         gates: float | Mapping[str, float | None] | None = None,
         mixtures: Mapping[str, Outliers] | None = None,
-        recovery: Recovery | None = OpenedRecovery(),  # noqa: B008 - immutable
+        recovery: Recovery | None = Readmission(),  # noqa: B008 - immutable
         transform: Transform = "extended",
     ) -> None:
         if transform not in TRANSFORMS:
@@ -134,16 +134,33 @@ class ModelFilter:
         now = Rejected(measurement, innovation.residual, H, nis, innovation)
         rest = without(state.rejected, own)
         if self.recovery is not None:
-            for earlier in self.recovery.agreeing(now, own)[:1]:
-                recovered = self.recovery.recover(state.belief, earlier, now, model)
-                return FilterState(recovered, state.outliers - 1, rest, innovation, (*accepted, earlier.taken))
+            found = self.recovery.agreeing(now, own)
+            if self.recovery.suffice(now, own, found):
+                return self._recovered(state, found[0], now, model, rest, accepted, 1)
         if innovation.accepted:
             return FilterState(belief, state.outliers, rest, innovation, accepted)
-        if self.recovery is not None and len(own) >= REMEMBERED:
-            recovered = self.recovery.recover(state.belief, own[-1], now, model)
-            return FilterState(recovered, state.outliers, rest, innovation, (*accepted, own[-1].taken))
+        if self.recovery is not None and self.recovery.forces and len(own) >= REMEMBERED:
+            return self._recovered(state, own[-1], now, model, rest, accepted, 0)
         verdicts = (*verdicts, (measurement, OUTLIER, nis))
-        return FilterState(state.belief, state.outliers + 1, (*state.rejected, now), innovation, verdicts)
+        rejected = (*rest, *own[1 - REMEMBERED :], now) if len(own) >= REMEMBERED else (*state.rejected, now)
+        return FilterState(state.belief, state.outliers + 1, rejected, innovation, verdicts)
+
+    def _recovered(
+        self,
+        state: FilterState,
+        earlier: Rejected,
+        now: Rejected,
+        model: MeasurementModel,
+        rest: tuple[Rejected, ...],
+        accepted: Verdicts,
+        confirmed: int,
+    ) -> FilterState:
+        assert self.recovery is not None
+        belief = self.recovery.recover(state.belief, earlier, now, model)
+        if self.recovery.fuses_both:
+            return FilterState(belief, state.outliers - confirmed, rest, now.innovation, (*accepted, earlier.taken))
+        suspect = (*of_source(state.rejected, now.measurement)[2 - REMEMBERED :], now)
+        return FilterState(belief, state.outliers, (*rest, *suspect), now.innovation, accepted)
 
     def _weighed(
         self, state: FilterState, measurement: Measurement, model: MeasurementModel, mixture: Outliers

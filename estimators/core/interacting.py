@@ -150,18 +150,21 @@ class InteractingModelFilter:
         if is_wrong or (own and innovation.nis > chi_square(PROBABLE, innovation.residual.size)):
             now = _rejected(state, fix, model, modes, innovation)
             agreeing = self._recovery.agreeing(now, own)
-            needed = 1 if state.accepted < TRUSTED else 2
-            if len(agreeing) >= needed or (is_wrong and len(own) >= REMEMBERED):
+            enough = self._recovery.suffice(now, own, agreeing, state.accepted >= TRUSTED)
+            if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED):
                 earlier = agreeing[0] if agreeing else own[-1]
                 beliefs = (self._recovery.recover(state.belief, earlier, now, model),) * len(modes)
-                taken = [found.taken for found in agreeing or (earlier,)]
-                verdicts = (*state.verdicts, (fix, "", innovation.nis), *taken)
-                count -= len(agreeing)
+                verdicts = (*state.verdicts, (fix, "", innovation.nis))
+                if self._recovery.fuses_both:
+                    verdicts += tuple(found.taken for found in agreeing or (earlier,))
+                    count -= len(agreeing)
                 return InteractingState(
                     beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles
                 )
             if is_wrong:
-                rejected = (*state.rejected, now)
+                rejected = (
+                    (*rejected, *own[1 - REMEMBERED :], now) if len(own) >= REMEMBERED else (*state.rejected, now)
+                )
             count += is_wrong
         accepted = state.accepted + (not is_wrong)
         transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))

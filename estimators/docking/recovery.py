@@ -57,8 +57,16 @@ def recover(belief: Gaussian, earlier: Rejected, now: Rejected, noise: DockingNo
 class FixRecovery:
     """The `Recovery` of a filter on the planar model: its position and its current are opened, both fixes fused."""
 
+    fuses_both = forces = True
+
     def __init__(self, noise: DockingNoise) -> None:
         self._noise = noise
+
+    def suffice(
+        self, now: Rejected, rejected: Sequence[Rejected], agreeing: Sequence[Rejected], cautious: bool = False
+    ) -> bool:
+        """One agreeing fix: it takes two to find the position and the current; for the cautious, two."""
+        return len(agreeing) >= 1 + cautious
 
     def agreeing(self, now: Rejected, rejected: Sequence[Rejected]) -> list[Rejected]:
         """Those of the rejected fixes that agree with that of now and with each other, the latest first."""

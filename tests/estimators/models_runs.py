@@ -1,7 +1,7 @@
 """A simulated unicycle among beacons, and a vehicle of constant velocity with a DVL: truth and measurements."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -9,7 +9,7 @@ import numpy as np
 from estimators.core.filter import ModelFilter
 from estimators.core.history import History
 from estimators.core.models import sensors
-from estimators.core.models.motion import Motion, unicycle, with_error
+from estimators.core.models.motion import Motion, constant_velocity, unicycle, with_current, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Array, Gaussian, Measurement
 
@@ -89,7 +89,7 @@ def measured(kind, value, sigma, stamp, source="", sequence=None, received=None,
 
 def estimated(run: Run, filter_: ModelFilter, keep: float = 1e6) -> tuple[Array, Array, History]:
     """Means (k, n), covariances (k, n, n) at the ticks, with measurements delivered as received."""
-    history = History(filter_, step=STEP, keep=keep, verdicts=lambda state: state.verdicts)
+    history = History(filter_, step=float(run.times[1]), keep=keep, verdicts=lambda state: state.verdicts)
     waiting = sorted(run.measurements, key=lambda m: m.received)
     means, covariances, given = [], [], 0
     for k, time in enumerate(run.times.tolist()):
@@ -106,3 +106,53 @@ def estimated(run: Run, filter_: ModelFilter, keep: float = 1e6) -> tuple[Array,
 def rms(means: Array, truth: Array, begin: int = 0) -> float:
     """Horizontal [m]."""
     return float(np.sqrt(np.mean(np.sum((means - truth[:, : means.shape[1]])[begin:, :2] ** 2, axis=1))))
+
+
+VELOCITY_NOISE = {"north": 1e-4, "east": 1e-4, "heading": 1e-6, "surge": 1e-4, "sway": 1e-4, "yaw_rate": 1e-5,
+                  "current_north": 1e-7, "current_east": 1e-7}  # fmt: skip
+SIGMAS = {"compass": 0.02, "gyro": 0.003, "dvl": 0.02, "water": 0.03, "fix": 1.5}
+
+
+@cache
+def body_motion() -> Motion:
+    """A vehicle whose velocity is a random walk, in a current."""
+    return with_current(constant_velocity(turning=True))
+
+
+@cache
+def body_process() -> MotionProcess:
+    return MotionProcess(body_motion(), VELOCITY_NOISE)
+
+
+@cache
+def body_sensors() -> dict[str, sensors.Sensor]:
+    motion = body_motion()
+    return {
+        "compass": sensors.compass(motion),
+        "gyro": sensors.gyro(motion),
+        "dvl": sensors.dvl(motion),
+        "water": sensors.dvl(motion, track="water"),
+        "fix": sensors.fix(motion),
+    }
+
+
+def body_run(seed: int, duration: float = 400.0, step: float = 0.5, faster: float = 0.0) -> Run:
+    """Compass and gyro at each step, DVL each second, fixes each 10 s; `faster` is gained from 120 s to 180 s [m/s]."""
+    rng = np.random.default_rng(seed)
+    process, count = body_process(), round(duration / step)
+    mean, deviations = np.array([0, 0, rng.uniform(-3, 3), 1.0, 0, 0, 0, 0]), [2, 2, 0.05, 0.1, 0.05, 0.02, 0.3, 0.3]
+    belief = Gaussian(mean=mean, covariance=np.diag(np.square(deviations)))
+    x = mean + deviations * rng.standard_normal(8)
+    truth, taken = [x], []
+    for k in range(1, count + 1):
+        Q = process.covariance(x, (), step)
+        x = process.evaluate(x, (), step) + np.linalg.cholesky(Q + 1e-18 * np.eye(8)) @ rng.standard_normal(8)
+        x[3] += faster * step / 60.0 if 120.0 < step * k <= 180.0 else 0.0
+        truth.append(x)
+        for kind, every in (("compass", 1), ("gyro", 1), ("dvl", 2), ("water", 2), ("fix", 20)):
+            if k % every == 0:
+                model = body_sensors()[kind]
+                empty = measured(kind, np.zeros(model.size), SIGMAS[kind], step * k, sequence=k)
+                value = model.evaluate(x, empty) + SIGMAS[kind] * rng.standard_normal(model.size)
+                taken.append(replace(empty, value=value))
+    return Run(step * np.arange(count + 1), np.array(truth), [()] * count, taken, belief)
