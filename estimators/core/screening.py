@@ -1,4 +1,4 @@
-"""One gate for every scalar sensor: values that no filter should see are refused by name, before any model sees them."""
+"""One gate for every scalar sensor: values no filter should see are refused by name, before any model sees them."""
 
 import math
 from dataclasses import dataclass

@@ -67,14 +67,22 @@ def inputs(seed):
             rows.append((fix.stamp, received + 1.0, *place, k))
     rows.append((60.0, 60.5, math.nan, 1.0, 999))
     rows.append((61.0, 61.5, 1e9, 1.0, 998))
-    return {"compass": run.compass, "rudder": run.rudder, "deviation": run.usbl.deviations[0], "packets": np.array(rows)}
+    return {
+        "compass": run.compass,
+        "rudder": run.rudder,
+        "deviation": run.usbl.deviations[0],
+        "packets": np.array(rows),
+    }
 
 
 def outputs(given, name):
     """Means and covariances at every tenth tick (12, 8 + 36), and all counts at the end."""
     deviation = float(given["deviation"])
     usbl = UsblModel(ranges=(1.0, 2.0), deviations=(deviation, deviation))
-    estimator, rows = DockingEstimator(FILTERS[name](), usbl, step=TICK), sorted(given["packets"].tolist(), key=received)
+    estimator, rows = (
+        DockingEstimator(FILTERS[name](), usbl, step=TICK),
+        sorted(given["packets"].tolist(), key=received),
+    )
     upper, said, estimate = np.triu_indices(8), [], None
     for k, heading in enumerate(given["compass"].tolist()):
         arrived = [row for row in rows if row[1] <= TICK * k]
