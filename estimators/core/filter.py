@@ -159,8 +159,11 @@ class ModelFilter:
         belief = self.recovery.recover(state.belief, earlier, now, model)
         if self.recovery.fuses_both:
             return FilterState(belief, state.outliers - confirmed, rest, now.innovation, (*accepted, earlier.taken))
+        # What is remembered of the source is from now on seen from the belief that has followed it.
+        moved = belief.mean - state.belief.mean
         suspect = (*of_source(state.rejected, now.measurement)[2 - REMEMBERED :], now)
-        return FilterState(belief, state.outliers, (*rest, *suspect), now.innovation, accepted)
+        seen_anew = (r._replace(residual=r.residual - r.H @ moved) for r in suspect)
+        return FilterState(belief, state.outliers, (*rest, *seen_anew), now.innovation, accepted)
 
     def _weighed(
         self, state: FilterState, measurement: Measurement, model: MeasurementModel, mixture: Outliers

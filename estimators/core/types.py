@@ -133,12 +133,14 @@ class MeasurementModel(Protocol):
         return self.evaluate(x, measurement), self.jacobian(x, measurement)
 
 
-Models = Mapping[str | tuple[str, str], MeasurementModel]  # by kind, or by (kind, source)
+Models = Mapping[str | tuple[str, str], MeasurementModel]  # by kind, or by (kind, source), a source not empty
 NO_MODEL = "no_model"  # why a measurement is refused of which a filter has no model
 
 
 def model_of(models: Models, measurement: Measurement) -> MeasurementModel | None:
     """The model of a measurement's kind and source, or else of its kind; None if there is neither."""
+    if not measurement.source:
+        return models.get(measurement.kind)
     return models.get((measurement.kind, measurement.source)) or models.get(measurement.kind)
 
 

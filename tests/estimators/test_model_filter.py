@@ -27,11 +27,11 @@ from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter, at_first
 from estimators.core.interacting import InteractingModelFilter
 from estimators.core.models import sensors
-from estimators.core.models.motion import unicycle
+from estimators.core.models.motion import constant_velocity, unicycle, with_depth
 from estimators.core.models.process import MotionProcess
 from estimators.core.outliers import Outliers
 from estimators.core.particle import ParticleFilter, drawn
-from estimators.core.recovery import Readmission
+from estimators.core.recovery import Readmission, opened
 from estimators.core.types import Gaussian
 
 
@@ -261,3 +261,47 @@ def test_what_a_filter_cannot_use_is_said():
     with pytest.raises(ParameterError, match="no model of the gated kind 'dvl'; there are range"):
         ModelFilter(process(), ranges(), run.belief, gates={"dvl": 0.99})
     assert isinstance(run, Run)
+
+
+def reasons(values, recovery, kind="depth", period=1.0):
+    """Why a filter that knows a constant depth, north and east of 0 refuses values of noise 0.1; "" if it does not."""
+    motion = with_depth(constant_velocity())
+    model = MotionProcess(motion, {"north": 1e-4, "east": 1e-4, "depth": 1e-4})
+    belief = motion.space.belief({}, {"north": 0.1, "east": 0.1, "depth": 0.1})
+    shown = {"depth": sensors.depth(motion), "fix": sensors.fix(motion)}
+    estimator = Estimator(ModelFilter(model, shown, belief, gates=0.999, recovery=recovery), step=period)
+    estimator.tick(0.0)
+    found = []
+    for k, value in enumerate(values):
+        seen = measured(kind, np.atleast_1d(value), 0.1, period * (k + 1), sequence=k)
+        found += [o.reason for o in estimator.tick(period * (k + 1), (), [seen]).outcomes]
+    return found
+
+
+def test_a_source_is_let_in_by_those_that_agree_and_stays_until_it_fits():
+    out = "outlier"
+    assert reasons([0.0, 5.0, 0.0, 0.0], Readmission()) == ["", out, "", ""]
+    assert reasons([9.0, 9.0, 9.0, 18.0, 18.0], Readmission())[:4] == [out, out, "", out]
+    # So small a belief follows slowly: let in again and again, though each is outside the gate.
+    assert reasons([9.0] * 6, Readmission()) == [out, out, "", "", "", ""]
+    assert reasons([9.0, -9.0, 20.0, -20.0, 30.0, -30.0, 40.0], Readmission()) == [out] * 7
+    assert reasons([9.0] * 6, None) == [out] * 6
+    vectors = [[9.0, 0.0]] * 3
+    assert reasons(vectors, Readmission(), "fix") == [out, out, ""]
+    assert reasons(vectors, Readmission(), "fix", period=5.0) == [out, "", ""]  # they come slowly
+    assert reasons([[9.0, 0.0], [-9.0, 0.0], [9.0, 0.1]], Readmission(), "fix", period=5.0) == [out, out, ""]
+
+
+def test_opening_makes_the_belief_follow_at_once():
+    motion = constant_velocity()
+    belief = Gaussian(mean=np.zeros(4), covariance=np.diag([0.01, 0.01, 0.04, 0.04]) + 0.005)
+    H, residual = (
+        sensors.fix(motion).jacobian(np.zeros(4), measured("fix", [0.0, 0.0], 0.1, 0.0)),
+        np.array([5.0, -2.0]),
+    )
+    after = opened(belief, H, residual)
+    S = H @ after.covariance @ H.T
+    assert residual @ np.linalg.solve(S, residual) < 1.0
+    d = belief.covariance @ H.T @ np.linalg.solve(H @ belief.covariance @ H.T, residual)
+    assert pytest.approx(residual) == H @ d
+    assert after.covariance - belief.covariance == pytest.approx(np.outer(d, d))
