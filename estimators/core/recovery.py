@@ -64,7 +64,8 @@ class Readmission:
     Args:
         slow: Time between a source's vectors from which on one that agrees suffices [s]; else it takes two, since wrong
             ones that come fast, or are scalars, agree by chance far more often.
-        drift: How fast an error of the prediction may grow, in deviations of the measurement a second.
+        drift: How fast an error of the prediction may grow, in deviations of the measurement a second; None: 1 of a
+            scalar, 0.2 of a vector, which comes fast and may be wrong in all its components.
         max_age: Age at which a rejected measurement says nothing more of the present [s].
         opening: Open the belief along the line on which it explains the innovation with the least change: for sources
             that have no bias, so that a filter that disagrees with them must be wrong itself.
@@ -73,7 +74,7 @@ class Readmission:
     fuses_both = forces = False
 
     def __init__(
-        self, *, slow: float = 4.0, drift: float = 0.2, max_age: float = MAX_AGE, opening: bool = False
+        self, *, slow: float = 4.0, drift: float | None = None, max_age: float = MAX_AGE, opening: bool = False
     ) -> None:
         self._slow, self._drift, self._max_age, self._opening = slow, drift, max_age, opening
 
@@ -98,7 +99,8 @@ class Readmission:
         if age > self._max_age or now.residual.size != earlier.residual.size:
             return False
         R = now.measurement.covariance + earlier.measurement.covariance
-        S = R * (1.0 + (self._drift * age) ** 2)
+        drift = (1.0 if now.residual.size == 1 else 0.2) if self._drift is None else self._drift
+        S = R * (1.0 + (drift * age) ** 2)
         if now.innovation is not None and earlier.innovation is not None:
             growth = now.innovation.covariance - earlier.innovation.covariance
             S = S + np.diag(np.maximum(np.diagonal(growth), 0.0))
