@@ -22,7 +22,7 @@ from auvsim.data.recorder import Recorder
 from auvsim.data.variables import run_groups
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics import scenes
+from auvsim.physics import scenes, soundness
 from auvsim.physics.truth import Truth
 from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
@@ -47,6 +47,7 @@ def run(
     trial: int = 0,
     progress: Callable[[ProgressState], None] | None = None,
     path: str | os.PathLike[str] | None = None,
+    check_step: bool = True,
 ) -> Log:
     """Runs a scenario and returns its log, also when it diverges or is interrupted.
 
@@ -56,11 +57,14 @@ def run(
         trial: number of the run under that seed.
         progress: called about ten times a simulated minute.
         path: where the log is to stand, written as it grows; None keeps it in memory.
+        check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
 
     Raises:
         InputError: a model, a part or a number of the scenario cannot be used.
     """
     started = wall.perf_counter()
+    if check_step:
+        check_steps(scenario)
     simulation = Simulation(scenario, seed, trial, path=path)
     log, status = simulation.log, "complete"
     with log:
@@ -316,6 +320,16 @@ def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
     names = [*scenario.vehicles]
     source = f"{names[0]}/current" if len(names) == 1 else "water/current"
     return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
+
+
+def check_steps(scenario: Scenario) -> None:
+    """Sees that the physics step is short enough for every vehicle.
+
+    Raises:
+        InputError: it is too long; the text says which rate would do.
+    """
+    for model in {settings.model: None for settings in scenario.vehicles.values()}:
+        soundness.check_step(model, scenario.physics.integrator, scenario.rates.physics, scenario.water.density)
 
 
 def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> World:
