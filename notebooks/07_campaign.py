@@ -43,8 +43,8 @@ document = {
         "current": {"kind": "uniform", "speed": {"uniform": [0.0, 0.5]}, "direction_deg": {"uniform": [-180.0, 180.0]}}
     },
     "variants": {
-        "augmented_ekf": {"estimator": {"factory": "augmented_ekf"}},
-        "paper": {"estimator": {"factory": "paper"}},
+        "augmented_ekf": {"estimator": {"kind": "augmented_ekf"}},
+        "paper": {"estimator": {"kind": "paper"}},
     },
 }
 chosen = plan.parse(document)
@@ -78,17 +78,17 @@ for row in rows:
 # Six trials leave wide intervals, and say so. Differences are taken trial by trial, since both variants met the same water: that is what makes a few trials tell much.
 
 # %%
-for rate in statistics.rates(rows, chosen.variants):
+for rate in statistics.rates(rows, chosen.variants, chosen.layout):
     print(
         f"{rate.variant:<14} {rate.quantity:<13} {rate.successes} of {rate.trials}, 95 % interval {rate.low:.0%} to {rate.high:.0%}"
     )
 
 # %%
-for d in statistics.differences(rows, chosen.variants):
+for d in statistics.differences(rows, chosen.variants, chosen.layout):
     print(f"{d.variant} less {chosen.variants[0]}: {d.quantity:<15} {d.value:+8.3f}  ({d.low:+.3f} to {d.high:+.3f})")
 
 # %%
-for nees in statistics.consistency(rows, chosen.variants):
+for nees in statistics.consistency(rows, chosen.variants, chosen.layout):
     if nees.phase == "all":
         print(
             f"{nees.variant:<14} NEES per axis {nees.mean:6.2f}, of a consistent filter {nees.low:.2f} to {nees.high:.2f}"

@@ -41,11 +41,12 @@ water: {{sea_floor: 40.0}}
 ATTRIBUTES = {"scenario": SCENARIO, "seed": 7, "trial": 0}
 VEHICLE = {
     "model": "remus100", "nose": NOSE, "length": 1.6, "estimator": "made up", "controller": "torpedo", "dock": "dock",
-    "usbl_structure": "dock", "transceiver_forward": 0.0, "transceiver_starboard": 0.0, "transceiver_down": 0.0,
+    "usbl_structure": "dock",
 }  # fmt: skip
 STRUCTURE = {
     "model": "dock", "north": DOCK_NORTH, "east": DOCK_EAST, "depth": DOCK_DEPTH, "heading": DOCK_HEADING,
     "mouth_radius": 0.75, "throat_radius": 0.15, "cone_length": 1.03923, "throat_length": 0.4, "latched": 1.3,
+    "transceiver_forward": 0.0, "transceiver_starboard": 0.0, "transceiver_down": 0.0,
 }  # fmt: skip
 # Along and cross track [m]: past the dock at the first attempt, into it at the second.
 GO_AROUND = [(-290, 40), (-180, 18), (-90, 5), (-30, 2.2), (6, 2.0), (40, 20), (30, 70), (-40, 90), (-110, 60)]

@@ -51,7 +51,7 @@ def test_the_printed_log_format_is_the_log_format():
 
 
 def test_the_printed_columns_of_a_campaign_are_its_columns():
-    from auvsim.campaign.table import markdown
+    from auvsim.campaign.columns import markdown
 
     assert (ROOT / "docs" / "campaign_table.md").read_text() == markdown() + "\n"
 
@@ -59,7 +59,11 @@ def test_the_printed_columns_of_a_campaign_are_its_columns():
 def test_the_plan_in_the_documentation_is_a_plan():
     from auvsim.campaign import plan
 
-    text = (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1].split("```")[0]
-    found = plan.parse(yaml.safe_load(text))
-    assert len(found.cells) == 3
-    assert found.variants == ("ekf", "imm")
+    docking, track = (
+        plan.parse(yaml.safe_load(part.split("```")[0]))
+        for part in (ROOT / "docs" / "campaigns.md").read_text().split("```yaml\n")[1:]
+    )
+    assert (docking.layout.success, track.layout.success) == ("docked", "success")
+
+    assert len(docking.cells) == 3
+    assert docking.variants == ("ekf", "imm")

@@ -1,19 +1,22 @@
-"""What a campaign comes to: success rates, paired differences between variants, consistency of the estimators."""
+"""What a campaign comes to: success rates, paired differences between variants, consistency of the estimators.
 
-from collections.abc import Mapping, Sequence
+A trial is one sample, since its vehicles share current and noise: it had success if all of its vehicles had, and its
+numbers are the means over them.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean as mean
 from typing import Any
 
 import numpy as np
 
 from auvsim.analysis.statistics import bootstrap, newcombe, wilson
-from auvsim.campaign.table import UNDER_WAY
+from auvsim.campaign.columns import Layout
 from estimators.core.consistency import interval
 
 Row = Mapping[str, Any]  # of the table
 
-RATES = ("docked", "docked_first")
-MEANS = ("miss_distance", "position_rms", "current_rms", "nees_per_dof", "contact_impulse", "time")
 CONFIDENCE = 0.95
 
 
@@ -22,7 +25,7 @@ class Rate:
     """How often something happened, with Wilson's interval."""
 
     variant: str
-    quantity: str  # of RATES
+    quantity: str  # of the layout's rates
     successes: int
     trials: int
     low: float
@@ -34,7 +37,7 @@ class Difference:
     """A quantity of a variant less that of the first variant, in the same trials."""
 
     variant: str
-    quantity: str  # of RATES or MEANS
+    quantity: str  # of the layout's rates or means
     value: float
     low: float
     high: float
@@ -58,43 +61,45 @@ class Nees:
         return self.low <= self.mean <= self.high
 
 
-def rates(rows: Sequence[Row], variants: Sequence[str]) -> list[Rate]:
-    """The success rates of each variant."""
+def rates(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Rate]:
+    """The success rates of each variant, over the trials in which the question arises for a vehicle."""
     found = []
     for variant in variants:
-        own = [row for row in rows if row["variant"] == variant]
-        for quantity in RATES:
-            successes = sum(bool(row[quantity]) for row in own)
-            low, high = wilson(successes, len(own), CONFIDENCE)
-            counts = {"successes": successes, "trials": len(own)}
+        own = by_trial(rows, variant).values()
+        for quantity in layout.rates:
+            answers = [answer for group in own if (answer := over(all, group, quantity)) is not None]
+            low, high = wilson(sum(answers), len(answers), CONFIDENCE)
+            counts = {"successes": sum(answers), "trials": len(answers)}
             found.append(Rate(variant=variant, quantity=quantity, **counts, low=low, high=high))
     return found
 
 
-def differences(rows: Sequence[Row], variants: Sequence[str]) -> list[Difference]:
+def differences(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Difference]:
     """Each variant less the first, over the trials in which both have the quantity; nothing where none has.
 
     Means have BCa bootstrap intervals over the pairs (Efron 1987). Rates have Newcombe's (1998), since a
     bootstrap of pairs that are all alike would claim to be certain.
     """
-    by_variant = {name: {row["trial"]: row for row in rows if row["variant"] == name} for name in variants}
-    reference, *others = by_variant
+    reference, *others = (by_trial(rows, name) for name in variants)
     found = []
-    for variant in others:
-        shared = sorted(by_variant[variant].keys() & by_variant[reference].keys())
-        pairs = [(by_variant[variant][trial], by_variant[reference][trial]) for trial in shared]
-        for quantity in (*RATES, *MEANS):
-            values = np.array([(a[quantity], b[quantity]) for a, b in pairs], dtype=float).reshape(-1, 2)  # None: NaN
+    for variant, trials in zip(variants[1:], others, strict=True):
+        pairs = [(trials[trial], reference[trial]) for trial in sorted(trials.keys() & reference.keys())]
+        for quantity in (*layout.rates, *layout.means):
+            combined = all if quantity in layout.rates else mean
+            values = np.array([[over(combined, group, quantity) for group in pair] for pair in pairs], dtype=float)
+            values = values.reshape(-1, 2)  # None: NaN
             values = values[np.isfinite(values).all(axis=1)]
             if len(values):
                 less = values[:, 0] - values[:, 1]
-                low, high = newcombe(values > 0.5, CONFIDENCE) if quantity in RATES else bootstrap(less, CONFIDENCE)
+                low, high = (
+                    newcombe(values > 0.5, CONFIDENCE) if quantity in layout.rates else bootstrap(less, CONFIDENCE)
+                )
                 counted = {"value": float(less.mean()), "low": low, "high": high, "pairs": len(less)}
                 found.append(Difference(variant=variant, quantity=quantity, **counted))
     return found
 
 
-def consistency(rows: Sequence[Row], variants: Sequence[str]) -> list[Nees]:
+def consistency(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Nees]:
     """NEES of each variant, in all phases together and in each.
 
     The errors along one trial hang together, so a trial counts as one sample of two degrees of freedom; as it holds
@@ -102,12 +107,27 @@ def consistency(rows: Sequence[Row], variants: Sequence[str]) -> list[Nees]:
     """
     found = []
     for variant in variants:
-        own = [row for row in rows if row["variant"] == variant]
-        for phase in ("all", *UNDER_WAY):
+        own = by_trial(rows, variant).values()
+        for phase in ("all", *layout.phases):
             key = "nees_per_dof" if phase == "all" else f"nees_per_dof_{phase}"
-            values = [row[key] for row in own if row[key] is not None]
+            values = [value for group in own if (value := over(mean, group, key)) is not None]
             if values:
                 low, high = (end / 2.0 for end in interval(2.0, len(values), CONFIDENCE))
-                mean = float(np.mean(values))
-                found.append(Nees(variant=variant, phase=phase, mean=mean, low=low, high=high, trials=len(values)))
+                average = float(np.mean(values))
+                found.append(Nees(variant=variant, phase=phase, mean=average, low=low, high=high, trials=len(values)))
     return found
+
+
+def by_trial(rows: Iterable[Row], variant: str) -> dict[int, list[Row]]:
+    """The vehicles of each trial of a variant."""
+    found: dict[int, list[Row]] = {}
+    for row in rows:
+        if row["variant"] == variant:
+            found.setdefault(row["trial"], []).append(row)
+    return found
+
+
+def over(combined: Callable[[list[Any]], Any], vehicles: Iterable[Row], quantity: str) -> Any:
+    """A quantity of a trial, combined over its vehicles that have it; None if none has."""
+    values = [row[quantity] for row in vehicles if row.get(quantity) is not None]
+    return combined(values) if values else None

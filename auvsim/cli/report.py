@@ -110,7 +110,7 @@ class CampaignState(Protocol):
 
     done: int
     total: int  # at most
-    docked: int
+    successes: int
     errors: int
     rate: float  # trials a second
     remaining: float  # [s]
@@ -124,7 +124,7 @@ class CampaignProgress(_Bar):
         self._line = 0.0
 
     def __call__(self, state: CampaignState) -> None:
-        failed = state.done - state.docked
+        failed = state.done - state.successes
         text = f"{state.done}/{state.total} done  {failed} failed"
         text += f" ({state.errors} by errors)" if state.errors else ""
         text += f"  {state.rate:.2f} a second  {_duration(state.remaining)} to go"

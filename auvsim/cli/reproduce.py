@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from auvsim.base.errors import InputError
-from auvsim.cli.dock import output_folder
 from auvsim.cli.report import StudyProgress
+from auvsim.cli.run import output_folder
 from auvsim.reproduce import paired
 from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
 from auvsim.reproduce.paper1 import mujoco as paper1_mujoco

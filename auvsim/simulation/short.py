@@ -103,10 +103,10 @@ def estimator_keys(kind: str) -> set[str]:
 
 
 def _of_a_kind(estimator: Mapping) -> dict:
-    kind = str(estimator["factory"])
+    kind = estimator["factory"]  # of a plan, maybe a distribution
     rest = {key: value for key, value in estimator.items() if key != "factory"}
     of_all = {key for model in schema.members(EstimatorSettings) for key in model.model_fields}
-    known = estimator_keys(kind) or of_all
+    known = estimator_keys(str(kind)) or of_all
     return {"kind": kind} | {key: value for key, value in rest.items() if key in known or key not in of_all}
 
 

@@ -12,7 +12,7 @@ from rich.table import Table
 
 from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.navigation.navigator import FACTORIES
+from auvsim.navigation.registry import ESTIMATORS as FACTORIES
 from auvsim.studies.trials import Summary, docking_trial
 
 LATER = 3  # attempts that the default guidance has

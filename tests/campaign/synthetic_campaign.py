@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 from auvsim.analysis.statistics import wilson
+from auvsim.campaign.columns import layout
 from auvsim.campaign.report import Content
 from auvsim.campaign.statistics import Difference, Nees, Rate
 
@@ -82,6 +83,7 @@ def content(**changes) -> Content:
         "state": {"engine": "processes", "jobs": 2, "versions": {"auvsim": "0.1.0"}, "wall_time": 61.0},
         "files": ("plan.yaml", "table.csv"),
         "drawn": DRAWN,
+        "layout": layout(("docking",)),
         "rows": table,
         "rates": rates(table, variants),
         "differences": [Difference(quantity="docked", **difference)],

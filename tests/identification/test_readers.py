@@ -16,7 +16,7 @@ from auvsim.identification.readers import read
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signal, Signals
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.simulation.run import run as run_trial
 
 NORTH, EAST, HEADING, SURGE, YAW_RATE = (MEASURED.index(n) for n in ("north", "east", "heading", "surge", "yaw_rate"))
 
@@ -272,8 +272,9 @@ def test_strays_are_found_and_nothing_else() -> None:
 def test_a_trial_log_is_read_as_the_vehicle_sensed_it(tmp_path: Path) -> None:
     """Against the truth of the same log: no error beyond the sensors', and nothing lost or flagged by truth is used."""
     plan = sampling.merge(sampling.manoeuvre_plan("zigzag"), {"manoeuvre": {"duration": 60.0}})
-    truth = run_trial(scenario.parse(sampling.draw(plan, 5)), seed=5)
-    log.write(truth, tmp_path / "zigzag.nc")
+    found = run_trial(scenario.parse(sampling.draw(plan, 5)), seed=5)
+    log.write(found, tmp_path / "zigzag.nc")
+    truth = found.vehicle()
     record, _ = only(tmp_path / "zigzag.nc")
     assert record.kind == "zigzag"
     at = np.searchsorted(truth["truth"]["time"], record.times - 1e-6)
@@ -302,12 +303,13 @@ def test_docking_logs_leave_out_what_is_not_planar(tmp_path: Path) -> None:
     plan = scenario.parse(
         sampling.draw(sampling.merge(sampling.default_plan(), {"vehicle": {"start": {"depth": 10.0}}}), 1)
     )
-    trial = run_trial(plan, seed=1)
-    log.write(trial, tmp_path / "trial.nc")
+    found = run_trial(plan, seed=1)
+    log.write(found, tmp_path / "trial.nc")
+    trial = found.vehicle()
     readings = read([tmp_path / "trial.nc"])
     assert readings.records
     assert "left out" in " ".join(readings.notes)
-    docked = trial["guidance"]["time"][trial["guidance"]["phase"] == 4]
+    docked = trial["mission"]["time"][trial["mission"]["phase"] == 4]
     for record in readings.records:
         at = np.searchsorted(trial["truth"]["time"], record.times - 1e-6)
         assert np.abs(np.degrees(trial["truth"]["attitude"][at, 1])).max() < 10.0

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from synthetic import DOCK, DOCK_HEADING, GO_AROUND, NOSE, empty_log, from_dock, trial_log, truth, writer
+from synthetic import DOCK, DOCK_HEADING, GO_AROUND, NOSE, empty_log, from_dock, trial_log, truth, writer, writers
 
 from auvsim.analysis.estimates import estimate_errors, estimate_quality, fix_fates, fixes, refusals
 from auvsim.analysis.summary import summarise
@@ -233,7 +233,7 @@ def test_contact_and_fix_counts():
 def test_fixes_are_where_the_transponder_is():
     transceiver, attitude = np.array([0.5, -0.2, -1.0]), (0.04, -0.05, DOCK_HEADING)  # roll, pitch, heading
     offsets = dict(zip(("forward", "starboard", "down"), transceiver.tolist(), strict=True))
-    recorder = writer(**{f"transceiver_{axis}": value for axis, value in offsets.items()})
+    recorder = writers({"remus100": {}}, {"dock": {f"transceiver_{a}": v for a, v in offsets.items()}})["remus100"]
     places = np.array([[-200.0, 30.0, 3.0], [-5.0, 1.0, 6.0]])
     for i, place in enumerate(places):
         relative = rotation(*attitude).T @ (place - DOCK) - transceiver
@@ -242,11 +242,10 @@ def test_fixes_are_where_the_transponder_is():
     log = recorder.finish("complete")
     np.testing.assert_allclose(fixes(log), places[:, :2], atol=1e-12)  # rounding at 200 m
     assert fixes(empty_log()).shape == (0, 2)
-    # Logs of formats 1 and 2 say of the dock where its transceiver is, and not whose it is.
-    old = {key: value for key, value in log.attributes.items() if "transceiver" not in key and "usbl" not in key}
-    moved = {key: value for key, value in log.attributes.items() if "transceiver" in key}
-    dock = {**log.log.group_attributes["structures/dock"], **moved}
-    converted = dataclasses.replace(log.log, group_attributes={"vehicles/remus100": old, "structures/dock": dock})
+    # Logs of formats 1 and 2 do not say whose USBL it is: it is that of the mission's dock.
+    old = {key: value for key, value in log.attributes.items() if "usbl" not in key}
+    groups = {**log.log.group_attributes, "vehicles/remus100": old}
+    converted = dataclasses.replace(log.log, group_attributes=groups)
     np.testing.assert_array_equal(fixes(converted.vehicle()), fixes(log))
 
 

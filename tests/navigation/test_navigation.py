@@ -20,7 +20,7 @@ from auvsim.navigation import registry
 from auvsim.navigation.docking import DockingNavigator
 from auvsim.navigation.estimate import Estimate, estimator_events
 from auvsim.navigation.navigator import NavigatorSetup
-from auvsim.navigation.settings import EstimatorSettings
+from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics import planar_fit
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
@@ -42,7 +42,9 @@ EXACT: dict[str, Any] = {
 NONE = Commands(0.0, 0.0, 0.0)
 
 
-def build(name: str = "augmented_ekf", usbl: UsblSettings | None = None, **settings: Any) -> Any:
+def build(
+    name: str = "augmented_ekf", usbl: UsblSettings | None = None, rate: float = 10.0, **settings: Any
+) -> Any:
     """An estimator that assumes the shipped vehicle's planar model, for a dock away from the datum."""
     setup = NavigatorSetup(
         vehicle="auv",
@@ -50,7 +52,7 @@ def build(name: str = "augmented_ekf", usbl: UsblSettings | None = None, **setti
         parameters=planar_fit.fit_planar_model("remus100", 1.0).parameters,
         actuation=library.vehicle("remus100").actuation,
         period=0.5,
-        rates={"compass": 10.0},
+        rates={"compass": rate},
         usbl=usbl or UsblSettings(),
         dock=DOCK,
     )
@@ -247,13 +249,12 @@ def test_averaging_reduces_white_noise() -> None:
 @pytest.mark.parametrize(("rate", "readings"), [(20.0, 10.0), (4.0, 2.0), (1.0, 1.0)])
 def test_the_mean_of_n_readings_weighs_as_one_with_a_deviation_smaller_by_root_n(rate: float, readings: float) -> None:
     """The filter's first heading is one mean, its rate unknown; the second mean is fused with what that leaves."""
-    sensors = PLAN.sensors.model_copy(update={"compass": PLAN.sensors.compass.model_copy(update={"rate": rate})})
-    navigator = build("augmented_ekf", PLAN.model_copy(update={"sensors": sensors}))
-    navigator.update(0.5, [compass(0.5, 0.0)], NONE)
+    navigator = build("augmented_ekf", rate=rate)
+    navigator.update(0.5, [compass(0.5, 0.0)], (), NONE)
     packet = Reading("usbl", 0.5, 1.0, np.array([-50.0, 1.0, 2.0, 0.0, 0.0, 0.0, 12.0]), 0)
-    estimate = navigator.update(1.0, [compass(1.0, 0.0), packet], NONE)
+    estimate = navigator.update(1.0, [compass(1.0, 0.0), packet], (), NONE)
     assert estimate is not None
-    mean = math.radians(PLAN.estimator.compass_deg) ** 2 / readings
+    mean = math.radians(AugmentedSettings().compass_deg) ** 2 / readings
     left = mean + (0.5 * DockingNoise().initial_yaw_rate) ** 2
     # 10 %: the rate decays within the half second.
     assert estimate.covariance[2, 2] == pytest.approx(mean * left / (mean + left), rel=0.1)

@@ -9,6 +9,7 @@ from robustness.models import spoiled
 from auvsim.base.errors import InputError
 from auvsim.cli import main
 from auvsim.physics import planar_sets, soundness
+from auvsim.physics.forces import RECORD
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.planar.model import PRESTERO
@@ -23,9 +24,8 @@ VOLUME = 'data="0.0302437"'
 def refused(capsys: pytest.CaptureFixture, out: Path, *arguments: str) -> str:
     """The one line with which `auvsim dock` refuses what is given; it leaves no folder."""
     assert main(["dock", "--no-video", "--out", str(out), *arguments]) == 2
-    error = capsys.readouterr().err
-    assert error.count("\n") == 1
-    assert "Traceback" not in error
+    *before, error = capsys.readouterr().err.splitlines()
+    assert all(line.startswith("compiling ") for line in before)  # once, on a machine that has not yet
     assert not out.exists()
     return error
 
@@ -49,7 +49,7 @@ def refused(capsys: pytest.CaptureFixture, out: Path, *arguments: str) -> str:
         (ALLOCATION, ALLOCATION.replace("1 1 0 0", "1 1"), "'allocation_rudder' has 2 numbers; it wants 4"),
         (ALLOCATION, ALLOCATION.replace("1 1 0 0", "1 1 0 nan"), "the numeric 'allocation_rudder' is"),
         (ELEVATOR, ELEVATOR.replace("1 1", "0 inf"), "the numeric 'allocation_elevator' is"),
-        ('nuser_body="147"', 'nuser_body="10"', "nuser_body"),
+        (f'nuser_body="{RECORD}"', 'nuser_body="10"', "nuser_body"),
         ('model="remus100"', 'model="a/b"', 'model="a/b": give a name of 1 to 64 letters'),
         ('model="remus100"', 'model="Tümmler"', "give a name of 1 to 64 letters"),
         ('model="remus100"', f'model="{"x" * 300}"', "give a name of 1 to 64 letters"),

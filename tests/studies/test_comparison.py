@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from auvsim.simulation.trial import run_trial
 from rich.console import Console
 
-from auvsim.missions.docking.metrics import estimate_errors
+from auvsim.analysis.estimates import estimate_errors
 from auvsim.simulation import sampling, scenario
+from auvsim.simulation.run import run as run_trial
 from auvsim.studies.comparison import CELLS, Options, run_one, run_study, score, table
 from estimators.core.consistency import interval
 
@@ -69,8 +69,9 @@ def test_the_heading_of_the_interacting_models_is_consistent() -> None:
     """
     means = []
     for trial in range(10):
-        plan = sampling.merge(sampling.default_plan(), {"estimator": {"factory": "imm"}, "duration": 120.0})
-        errors = estimate_errors(run_trial(scenario.parse(sampling.draw(plan, 31, trial)), seed=31, trial=trial))
+        plan = sampling.merge(sampling.default_plan(), {"estimator": {"kind": "imm"}, "duration": 120.0})
+        log = run_trial(scenario.parse(sampling.draw(plan, 31, trial)), seed=31, trial=trial)
+        errors = estimate_errors(log.vehicle())
         free = errors.initialised & (errors.time > 30.0)
         means.append(float(np.mean((errors.heading[free] / errors.sigma[free, 2]) ** 2)))
     low, high = interval(1, samples=10, probability=0.99)
