@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from robustness.models import spoiled
 
 from auvsim.base.errors import InputError
 from auvsim.cli import main
@@ -13,6 +12,7 @@ from auvsim.physics.forces import RECORD
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.planar.model import PRESTERO
+from robustness.models import spoiled
 
 ALLOCATION = '<numeric name="allocation_rudder" data="1 1 0 0"/>'
 ELEVATOR = '<numeric name="allocation_elevator" data="0 0 1 1"/>'
