@@ -16,7 +16,7 @@ from auvsim.base.settings import OwnPart, kinds
 WIDTH = 120  # columns of the commented YAML
 
 
-class UnknownKey(ValueError):
+class UnknownKeyError(ValueError):
     """Raised by a validator that found a key which its settings do not have.
 
     Args:
@@ -99,7 +99,7 @@ def explain(error: ValidationError, model: type[BaseModel], values: Mapping, pla
     report = min(reports, key=lambda report: report["type"] != "extra_forbidden")
     path, owner, field = _locate(report["loc"], model, values)
     cause = report.get("ctx", {}).get("error")
-    if isinstance(cause, UnknownKey):
+    if isinstance(cause, UnknownKeyError):
         path = f"{path}.{cause.key}"
         text = f"unknown key; {suggestion(path, model, cause.siblings)}{cause.more}"
     else:
@@ -168,7 +168,9 @@ def _reason(
         return message.removeprefix("Value error, ")
     value = yaml_text.dump(report["input"], flow=True)
     value = value if len(value) <= 60 else value[:57] + "..."
-    return f"{value} {message.replace('Input should', 'should', 1).replace('be an object', 'be a mapping').replace('String should', 'should', 1)}{about}"
+    for said, better in (("Input should", "should"), ("String should", "should"), ("be an object", "be a mapping")):
+        message = message.replace(said, better, 1)
+    return f"{value} {message}{about}"
 
 
 def place(path: str, places: Mapping[str, str]) -> str:

@@ -269,7 +269,9 @@ def _run(arguments: list[str]) -> int:
         scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
         _, vehicle = scenario.lone
         if vehicle.mission.kind != "docking":
-            raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `auvsim run`")
+            manoeuvre = getattr(vehicle.mission, "manoeuvre", None)
+            meant = f"auvsim manoeuvre {manoeuvre.kind}" if manoeuvre else "auvsim run"
+            raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `{meant}`")
         return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
 
     if isinstance(command, Run):

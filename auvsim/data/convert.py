@@ -32,7 +32,7 @@ from auvsim.data.variables import (
 
 SENSORS = ("compass", "depth", "feedback", "usbl", "dvl", "gyro")
 STATES = {
-    "north": "m", "east": "m", "heading": "rad", "u": "m/s", "v": "m/s", "r": "rad/s",
+    "north": "m", "east": "m", "heading": "rad", "surge": "m/s", "sway": "m/s", "yaw_rate": "rad/s",
     "current_north": "m/s", "current_east": "m/s",
 }  # fmt: skip
 DOCKING_PHASES = ("search", "homing", "approach", "final", "docked", "go_around", "aborted")

@@ -15,10 +15,12 @@ along its last axis, separated by commas) and `flag_values` with `flag_meanings`
 
 ```python
 import xarray
+
 truth = xarray.open_dataset("trial.nc", group="vehicles/remus100/truth")
 
 from auvsim.data.log import read
-vehicle = read("trial.nc").vehicle()   # of the only vehicle; vehicle("auv_1") of one among several
+
+vehicle = read("trial.nc").vehicle()  # of the only vehicle; vehicle("auv_1") of one among several
 vehicle["truth"]["position"], vehicle["compass"]["value"], vehicle.phases
 ```
 

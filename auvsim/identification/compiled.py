@@ -43,7 +43,7 @@ def filters() -> ModuleType:
 
 def is_warm() -> bool:
     """Whether a fit starts at once; if not, the first one compiles for some seconds."""
-    return is_ready(segments().fold) and is_ready(filters().trace)
+    return is_ready(segments().normal_equations) and is_ready(filters().trace)
 
 
 def _linearise() -> str:

@@ -49,15 +49,15 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
     places, where = _places(log, found["heading"], plan.sensors.usbl.transponder)
     if len(where) > 1:
         found |= {axis: Signal(times=where, values=places[:, k]) for k, axis in enumerate(("north", "east"))}
-    barred = _barred(log)
+    excluded = _excluded(log)
     end = float(times[-1])
-    out = sum(min(stop, end) - start for start, stop in barred)
-    notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if barred else []
+    out = sum(min(stop, end) - start for start, stop in excluded)
+    notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if excluded else []
     deviations = _deviations(plan, places - usbl_dock(log).position[:2] if len(places) else places)
     parts = [
         Signals(
             name=label, kind=kind, signals=found, deviations=deviations,
-            barred=(*barred, (-math.inf, start), (stop, math.inf)),
+            excluded=(*excluded, (-math.inf, start), (stop, math.inf)),
         )
         for label, kind, start, stop in _parts(plan, name)
     ]  # fmt: skip
@@ -107,7 +107,7 @@ def _deviations(plan: VehicleSettings, places: Array) -> dict[str, float]:
     return {quantity: deviation for quantity, deviation in given.items() if deviation > 0.0}
 
 
-def _barred(log: VehicleLog) -> tuple[tuple[float, float], ...]:
+def _excluded(log: VehicleLog) -> tuple[tuple[float, float], ...]:
     """Spans in which the vehicle is steep, goes astern, or has come to the dock."""
     compass, feedback, mission = log["compass"], log["feedback"], log["mission"]
     spans = steep(Signal(times=compass["time"], values=compass["value"][:, 1]))

@@ -12,7 +12,7 @@ from auvsim.identification import checks, judgement
 from auvsim.identification.constraints import SIGNS, limits, prior_information
 from auvsim.identification.fit import DEFAULT_FREE, Fit, invert
 from auvsim.identification.identifiability import Identifiability, assess, likelihood_interval, sizes
-from auvsim.identification.judgement import Judged
+from auvsim.identification.judgement import HoldoutResult
 from auvsim.identification.least_squares import fit_least_squares
 from auvsim.identification.prediction_error import PredictionErrorOptions, fit_prediction_error
 from auvsim.identification.records import MEASURED, Readings, Record
@@ -25,7 +25,7 @@ from estimators.planar.model import PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
 LENGTH = 20.0  # of the segments fitted [s]
-PRIOR = 0.5  # relative deviation from the start that is believed where the data are blind
+PRIOR = 0.5  # relative standard deviation of the prior about the start, where the data alone cannot tell
 PROBABILITY = 0.95
 PROFILED = 4  # weak parameters whose likelihood is followed: each takes some dozens of fits
 NOISY = 1.1  # residuals beyond this many deviations show noise of the process
@@ -52,7 +52,7 @@ class Identification:
     identifiability: Identifiability
     intervals: dict[str, tuple[float, float]]  # 95 % of the free parameters; infinite where open
     profiled: tuple[str, ...]  # those of them by the ratio of likelihoods
-    judged: tuple[Judged, ...]  # of each held-out record
+    judged: tuple[HoldoutResult, ...]  # of each held-out record
     verdicts: tuple[Verdict, ...]
     readings: Readings
 
@@ -122,9 +122,9 @@ def identify(
     if not judging:
         records, judging, said = judgement.choose(records)
     checks.records(records, start)
-    fits, believed, notes = _fits(records, start, free, steps, say)
+    fits, prior_on, notes = _fits(records, start, free, steps, say)
     fit = fits[-1]
-    assessed = assess(_by_data_alone(fit, believed) if believed else fit)
+    assessed = assess(_by_data_alone(fit, prior_on) if prior_on else fit)
     intervals, profiled = _intervals(records, fits, assessed, say)
     say("predicting what was held out", 0.95)
     judged = tuple(judgement.judge(record, start, fit.parameters) for record in judging)
@@ -166,10 +166,10 @@ def _fits(
     steps: Sequence[str],
     say: Callable[[str, float], None],
 ) -> tuple[list[Fit], tuple[str, ...], list[Verdict]]:
-    """The fit of each step, each from the one before; parameters whose start was believed, and what that means."""
+    """The fit of each step, each from the one before; parameters whose start was prior_on, and what that means."""
     fits: list[Fit] = []
     notes: list[Verdict] = []
-    believed: tuple[str, ...] = ()
+    prior_on: tuple[str, ...] = ()
     if "least squares" in steps:
         say("least squares", 0.0)
         fits.append(fit_least_squares(records, start, free))
@@ -178,25 +178,25 @@ def _fits(
         found = fit_segments(records, start, free, SegmentOptions(length=LENGTH, signs=True))
         blind = assess(found).blind
         if blind or not found.converged:
-            believed = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
+            prior_on = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
             why = f"cannot tell {'; '.join(c.text for c in blind)}" if blind else "lead to no end"
-            text = f"the data alone {why}: the start of {', '.join(believed)} was believed to within {PRIOR:.0%}"
+            text = f"the data alone {why}: a prior of {PRIOR:.0%} about the start was put on {', '.join(prior_on)}"
             notes.append(Verdict(good=False, text=f"{text}, and decides these"))
-            options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, believed=believed)
+            options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, prior_on=prior_on)
             found = fit_segments(records, start, free, options)
         fits.append(found)
     if "prediction error" in steps:
         say("prediction error", 0.3)
         guess = fits[-1].parameters if "segments" in steps else None
-        held = PredictionErrorOptions(signs=True, prior=PRIOR if believed else None, believed=believed)
+        held = PredictionErrorOptions(signs=True, prior=PRIOR if prior_on else None, prior_on=prior_on)
         fits.append(fit_prediction_error(records, start, free, held, guess=guess))
-    return fits, believed, notes
+    return fits, prior_on, notes
 
 
-def _by_data_alone(fit: Fit, believed: Sequence[str]) -> Fit:
+def _by_data_alone(fit: Fit, prior_on: Sequence[str]) -> Fit:
     """The same with the covariance that the data alone would give."""
     centre = np.array([getattr(fit.start, name) for name in fit.free])
-    prior = prior_information(centre, fit.free, PRIOR, believed)
+    prior = prior_information(centre, fit.free, PRIOR, prior_on)
     known = np.isfinite(fit.deviations) & (fit.deviations > 0.0)
     information = np.zeros_like(fit.covariance)
     information[np.ix_(known, known)] = np.linalg.inv(fit.covariance[np.ix_(known, known)])
@@ -281,7 +281,7 @@ def _judgement(found: Identification, seconds: float) -> Verdict:
     return Verdict(good=False, text=f"{text}; keep the start, or log other manoeuvres")
 
 
-def _shares(judged: Judged) -> str:
+def _shares(judged: HoldoutResult) -> str:
     return f"{judged.start_share:.2%} against {judged.share:.2%}"
 
 

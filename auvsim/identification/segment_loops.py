@@ -141,7 +141,9 @@ def rho(square, loss, threshold):
 
 
 @compiled
-def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals):
+def normal_equations(
+    starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals
+):
     """Half the cost of a record's segments, their Gauss-Newton matrices and gradients, and the weighted residuals.
 
     Args:
@@ -175,7 +177,7 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
             for c in range(8):
                 here[c] = weights[c] != 0.0 and not math.isnan(measured[n, c])
             observe(x, S, (n - bounds[s]) * h, nuisance, k, here, y, J)
-            rows, part = take(
+            rows, part = add_sample(
                 measured[n], y, J, weights, here, loss, threshold, residuals[n], R, scaled, rows, H[s], g[s]
             )
             cost += part
@@ -185,12 +187,12 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
                 if not math.isfinite(x.sum()):
                     return math.inf, H, g
         R[rows:], scaled[rows:] = 0.0, 0.0
-        gather(H[s], g[s], R, scaled)
+        rank8_update(H[s], g[s], R, scaled)
     return (cost if math.isfinite(H.sum()) else math.inf), H, g
 
 
 @compiled
-def take(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, rows, H, g):
+def add_sample(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, rows, H, g):
     """Adds what is `here` of a sample to the weighted rows R (8, w), and these to H and g whenever they are full.
 
     Returns:
@@ -210,13 +212,13 @@ def take(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, r
                 R[rows, j] = root * weights[c] * J[c, j]
             rows += 1
             if rows == 8:
-                gather(H, g, R, scaled)
+                rank8_update(H, g, R, scaled)
                 rows = 0
     return rows, cost
 
 
 @compiled
-def gather(H, g, R, e):
+def rank8_update(H, g, R, e):
     """Adds R' R (upper triangle) and R' e of eight weighted rows; all eight at once: to load H is what costs time."""
     r0, r1, r2, r3, r4, r5, r6, r7 = R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7]
     for i in range(g.size):
@@ -237,13 +239,13 @@ def eliminate(H, g, damping):
         damping: Share of the diagonal added to that of the first states.
 
     Returns:
-        Sums over the segments, H (t, t) and g (t,), what brings the first states back, (s, 6, t + 1), and whether all
-        could be eliminated.
+        Sums over the segments, H (t, t) and g (t,), the back-substitution of the first states,
+        (s, 6, t + 1), and whether all could be eliminated.
     """
     count, width = g.shape
     t = width - 6
     total, gradient = np.zeros((t, t)), np.zeros(t)
-    back = np.empty((count, 6, t + 1))
+    back_substitution = np.empty((count, 6, t + 1))
     column = np.empty(6)
     block = np.empty((6, 6))
     for s in range(count):
@@ -253,27 +255,27 @@ def eliminate(H, g, damping):
             block[i, i] *= 1.0 + damping + ROUNDING
         L, positive = factor(block)
         if not positive:
-            return total, gradient, back, False
+            return total, gradient, back_substitution, False
         for j in range(t + 1):
             for i in range(6):
                 column[i] = H[s, i, 6 + j] if j < t else g[s, i]
             solve(L, column)
             for i in range(6):
-                back[s, i, j] = column[i]
+                back_substitution[s, i, j] = column[i]
         for i in range(t):
             for j in range(i, t):
                 correction = 0.0
                 for a in range(6):
-                    correction += H[s, a, 6 + i] * back[s, a, j]
+                    correction += H[s, a, 6 + i] * back_substitution[s, a, j]
                 total[i, j] += H[s, 6 + i, 6 + j] - correction
             correction = 0.0
             for a in range(6):
-                correction += H[s, a, 6 + i] * back[s, a, t]
+                correction += H[s, a, 6 + i] * back_substitution[s, a, t]
             gradient[i] += g[s, 6 + i] - correction
     for i in range(t):
         for j in range(i):
             total[i, j] = total[j, i]
-    return total, gradient, back, True
+    return total, gradient, back_substitution, True
 
 
 @compiled

@@ -37,7 +37,7 @@ class SegmentOptions:
     threshold: float = 2.5  # of a robust loss, in deviations
     signs: bool = False  # keeps the parameters of constraints.SIGNS on their side of zero
     prior: float | None = None  # weak prior: the start, with this relative deviation
-    believed: tuple[str, ...] | None = None  # parameters that it holds; None: all
+    prior_on: tuple[str, ...] | None = None  # parameters with a prior; None: all
     max_iterations: int = 50
     tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
 
@@ -60,7 +60,7 @@ class Point(NamedTuple):
     nuisances: Array  # (records, 6)
     starts: list[Array]  # of each record (s, 6)
     cost: float
-    folds: list[tuple[Array, Array]]  # of each record: matrices and gradients of `segment_loops.fold`
+    normal_equations: list[tuple[Array, Array]]  # matrices and gradients of each record
     residuals: list[Array]  # of each record (n, 8)
 
 
@@ -98,7 +98,7 @@ class Problem:
             if record.current is not None:
                 self._expected[r, :2] = record.current
         self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
-        self._prior = prior_information(self._vector[self.indices], free, options.prior, options.believed)
+        self._prior = prior_information(self._vector[self.indices], free, options.prior, options.prior_on)
         self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
         self.nuisances[:, 2:] = 0.0
 
@@ -109,13 +109,13 @@ class Problem:
         loss = LOSSES.index(self.options.loss)
         cost = 0.5 * float(self._prior @ (values - self._vector[self.indices]) ** 2)
         cost += 0.5 * float(np.sum(self._trust * (nuisances - self._expected) ** 2))
-        folds, residuals = [], []
+        normal_equations, residuals = [], []
         if not has_inertia(with_values(self.start, self.free, values)):
             cost = np.inf
         for cut, own, first in zip(self.cuts, nuisances, starts, strict=True):
             e = np.full(cut.measured.shape, np.nan)
             step = cut.record.step
-            part, H, g = self._loops.fold(
+            part, H, g = self._loops.normal_equations(
                 first, cut.bounds, cut.inputs, cut.measured, cut.weights, p, self.indices, own, step, substeps(step),
                 loss, self.options.threshold, e,
             )  # fmt: skip
@@ -123,23 +123,23 @@ class Problem:
             cost += part + 0.5 * float(np.sum((away / _FIRST) ** 2))
             H[:, range(6), range(6)] += _FIRST**-2
             g[:, :6] += away * _FIRST**-2
-            folds.append((H, g))
+            normal_equations.append((H, g))
             residuals.append(e)
-        return Point(values, nuisances, starts, cost, folds, residuals)
+        return Point(values, nuisances, starts, cost, normal_equations, residuals)
 
     def reduced(self, point: Point, damping: float) -> tuple[Array, Array, list[Array]]:
-        """Equations (T, T) and (T,) of parameters, then active nuisances; and what brings back the first states.
+        """Equations (T, T) and (T,) of parameters, then active nuisances; back-substitution of the first states.
 
         Raises:
             InputError: The first state of a segment cannot be eliminated.
         """
         k = len(self.free)
         size = k + int(self.active.sum())
-        total, gradient, backs = np.zeros((size, size)), np.zeros(size), []
+        total, gradient, back_substitution = np.zeros((size, size)), np.zeros(size), []
         total[range(k), range(k)] += self._prior
         gradient[:k] += self._prior * (self._vector[self.indices] - point.values)
-        for r, (H, g) in enumerate(point.folds):
-            part, descent, back, solved = self._loops.eliminate(H, g, damping)
+        for r, (H, g) in enumerate(point.normal_equations):
+            part, descent, matrix, solved = self._loops.eliminate(H, g, damping)
             if not solved:
                 raise InputError(f"record {self.cuts[r].record.name}: a segment does not show its first state")
             places, here = self._places(r)
@@ -148,17 +148,17 @@ class Problem:
             own = places[k:]
             total[own, own] += self._trust[r, self.active[r]]
             gradient[own] += (self._trust[r] * (self._expected[r] - point.nuisances[r]))[self.active[r]]
-            backs.append(back)
-        return total, gradient, backs
+            back_substitution.append(matrix)
+        return total, gradient, back_substitution
 
-    def moved(self, point: Point, step: Array, backs: list[Array]) -> Point:
+    def moved(self, point: Point, step: Array, back_substitution: list[Array]) -> Point:
         """The unknowns after a step (T,) of parameters and nuisances."""
         k = len(self.free)
         nuisances, starts = point.nuisances.copy(), []
-        for r, back in enumerate(backs):
+        for r, matrix in enumerate(back_substitution):
             places, here = self._places(r)
             nuisances[r, self.active[r]] += step[places[k:]]
-            starts.append(point.starts[r] + back[:, :, -1] - back[:, :, here] @ step[places])
+            starts.append(point.starts[r] + matrix[:, :, -1] - matrix[:, :, here] @ step[places])
         return self.at(point.values + step[:k], nuisances, starts)
 
     def _places(self, r: int) -> tuple[Indices, Indices]:
@@ -189,11 +189,12 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
     if not np.isfinite(point.cost):
         return point, 0, False
     for iteration in range(1, problem.options.max_iterations + 1):
-        H, g, backs = problem.reduced(point, damping)
+        H, g, back_substitution = problem.reduced(point, damping)
         step = bounded_step(H, g, damping, low - point.values, high - point.values)
-        eliminated = sum(np.sum(g[:, :6] * back[:, :, -1]) for (_, g), back in zip(point.folds, backs, strict=True))
+        pairs = zip(point.normal_equations, back_substitution, strict=True)
+        eliminated = sum(np.sum(g[:, :6] * matrix[:, :, -1]) for (_, g), matrix in pairs)
         gain = 0.5 * float(g @ step + eliminated)
-        trial = problem.moved(point, step, backs)
+        trial = problem.moved(point, step, back_substitution)
         last = gain < tolerance and damping <= 1e-3
         if not trial.cost < point.cost:
             if last or damping > 1e12:
@@ -228,7 +229,7 @@ def _cut(record: Record, length: float, states: Array) -> _Cut:
 
 
 def active_nuisances(record: Record, deviations: Array) -> Mask:
-    """Which nuisances (6,) a record has: those that are believed possible and touch a channel that was measured."""
+    """Which nuisances (6,) a record has: those with a prior deviation that touch a channel that was measured."""
     north, east, heading, surge, sway, rate, over_u, over_v = (
         bool(np.isfinite(values).any()) for values in record.measured.T
     )

@@ -1,4 +1,4 @@
-"""The docking estimators of `estimators.docking` behind the contract of a run: the middle between readings and filter."""
+"""The estimators of `estimators.docking` behind the contract of a run: from readings to what their filters take."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""What an estimator says: a named state with its covariance, the views that control and plots use, fates of readings."""
+"""What an estimator says: named states with their covariance, views of them, and the fates of measurements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field

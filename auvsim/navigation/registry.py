@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import chain
+from typing import Any
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
@@ -36,7 +37,7 @@ def build(setup: NavigatorSetup) -> Navigator:
         where = f"estimator '{kind}': settings"
         setup = replace(setup, settings=plugins.settings_of(factory, setup.settings.settings, where))
     try:
-        navigator = factory(setup)
+        navigator: Any = factory(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's factory may fail in any way

@@ -13,13 +13,14 @@ from auvsim.base.frames import (
     Array,
     euler_to_quaternion,
     flip,
-    flip_matrix,
     flip_quaternion,
 )
+from auvsim.physics import water_slot
 from auvsim.physics.fluid import WATER
 from auvsim.physics.truth import Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
+from auvsim.water.surface import surface
 
 
 class Craft:
@@ -89,15 +90,10 @@ class Craft:
             control[index] = value
 
     def refresh_water(self, current: CurrentField, time: float) -> None:
-        """Writes the local expansion of the current round the vehicle where the fluid callback reads it."""
-        position = self.position
-        water = current.evaluate(time, flip(position))
-        slot = self._water
-        slot[0] = time
-        slot[1:4] = position
-        slot[4:7] = flip(water.velocity)
-        slot[7:10] = flip(water.derivative)
-        slot[10:19] = flip_matrix(water.gradient).ravel()
+        """Writes the water round the vehicle, and the surface above it, where the fluid callback reads them."""
+        place = flip(self.position)
+        water, above = current.evaluate(time, place), surface(current, time, place)
+        water_slot.fill(self._water, time, self.position, water, above)
 
     def truth(self, current: CurrentField) -> Truth:
         """The true state now, in NED and forward-starboard-down."""

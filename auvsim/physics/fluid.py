@@ -15,8 +15,8 @@ they are an approximation, which has the lift coefficient of a sphere, 1/2 (Auto
 
 The water is a local expansion in `mjData.userdata`, one slot a vehicle (see `water_slot`). Where it has a surface,
 buoyancy is that of the strips under water; the other forces of a hull, and its added mass, fade with the share of its
-volume that is under water, those of fins, propellers and thrusters with the share of their area. What a breaking surface adds
-(slamming, ventilation, waves made) is left out.
+volume that is under water, those of fins, propellers and thrusters with the share of their area. What a breaking
+surface adds (slamming, ventilation, waves made) is left out.
 """
 
 import ctypes

@@ -13,7 +13,7 @@ import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip_matrix
-from auvsim.physics import fluid
+from auvsim.physics import fluid, thrusters
 from auvsim.physics.forces import (
     BRAKE,
     CHANNEL,
@@ -32,6 +32,7 @@ from auvsim.physics.forces import (
     THRUSTER,
     THRUSTER_KIND,
 )
+from auvsim.physics.strips import submerged_strips
 
 SEA_WATER = 1026.0  # density [kg/m3], as the REMUS-100 reference has it
 BRAKE_TIME = 0.02  # time in which a shaft faster than its motor's limits slows down [s]
@@ -131,37 +132,10 @@ def _record(body: Body, slot: int, density: float) -> Array:
         value = flip_matrix(value) if field in _MATRICES else value
         record[table[field][0] : table[field][0] + value.size] = value.ravel()
     if body.kind == "hull":
-        for field, value in _strips(body.fields).items():
-            at = {**HULL, **DERIVED}[field][0]
+        for field, value in submerged_strips(body.fields).items():
+            at = (HULL | DERIVED)[field][0]
             record[at : at + value.size] = value
     return record
-
-
-def _strips(fields: dict[str, Array]) -> dict[str, Array]:
-    """The cylinders along a hull's axis whose volume the surface cuts, and how deep none is cut.
-
-    Lengths are from the strips' spacing, diameters from their areas, volumes in proportion, sloped along the axis so
-    that their centre is the origin. A hull without strips, or whose strips do not allow that, is one cylinder as long
-    as thick.
-    """
-    volume = fields["displaced_volume"][0]
-    x, area = fields.get("strip_x", np.zeros(0)), fields.get("strip_area", np.zeros(0))
-    if x.size > 1 and np.all(np.diff(x) > 0) and np.all(area > 0):
-        length = np.gradient(x)
-        radius = 0.5 * area / length
-        share = radius**2 * length
-        share *= 1.0 - x * (share @ x) / (share @ x**2)
-        if np.all(share > 0):
-            reach = 1.5 * np.max(np.abs(x) + np.hypot(radius, 0.5 * length))  # waves may be as steep as 1 in 2
-            return {
-                "strip_volume": volume * share / share.sum(),
-                "strip_radius": radius,
-                "strip_half_length": 0.5 * length,
-                "reach": np.array([reach]),
-            }
-    radius = np.cbrt(volume / (2.0 * np.pi))
-    one = np.array([radius])
-    return {"strip_volume": np.array([volume]), "strip_radius": one, "strip_half_length": one, "reach": 1.5 * one}
 
 
 def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
@@ -195,7 +169,7 @@ def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
             armature = model.dof_armature[model.body_dofadr[body.index]]
             model.body_user[body.index, BRAKE] = armature / BRAKE_TIME
         elif body.kind == "thruster":
-            model.body_user[body.index, CHANNEL] = _channel(model, body.name)
+            model.body_user[body.index, CHANNEL] = thrusters.channel(model, body.name)
     if model.nuserdata < fluid.WATER * len(slots):
         raise InputError(
             f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}"
@@ -226,49 +200,12 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
         if body.kind == "propeller" and not _on_a_shaft(model, body.index):
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
         if body.kind == "thruster":
-            _check_place(model, data, body)
+            thrusters.check_place(model, data, body.index, body.fields["size"][0])
         if body.kind == "hull" and model.body_simple[base]:
             raise InputError(
                 f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of"
                 " mass is its origin; move the centre of mass or add a hinged body"
             )
-
-
-def _channel(model: mujoco.MjModel, name: str) -> int:
-    """Where the command of a thruster is, as its record holds it.
-
-    Raises:
-        InputError: it has no actuator of its name, or one that pushes by itself.
-    """
-    index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
-    if index < 0:
-        raise InputError(f"thruster '{name}' needs an actuator of its name, which takes its command")
-    if model.actuator_gainprm[index].any() or model.actuator_biasprm[index].any():
-        raise InputError(f"actuator '{name}' must have gainprm and biasprm 0: the water gives the thruster's force")
-    return int(model.actuator_actadr[index]) if model.actuator_actnum[index] else -1 - index
-
-
-def _check_place(model: mujoco.MjModel, data: mujoco.MjData, body: Body) -> None:
-    """Refuses a thruster that is off its vehicle: outside the box round the vehicle's geoms by more than its size."""
-    root = model.body_rootid[body.index]
-    geoms = [
-        i
-        for i in range(model.ngeom)
-        if model.body_rootid[model.geom_bodyid[i]] == root and model.geom_bodyid[i] != body.index
-    ]
-    if not geoms:
-        return
-    R = data.xmat[root].reshape(3, 3)
-    corners = np.array([[i, j, k] for i in (-1, 1) for j in (-1, 1) for k in (-1, 1)])
-    points = [
-        data.geom_xpos[i]
-        + (model.geom_aabb[i, :3] + corners * model.geom_aabb[i, 3:]) @ data.geom_xmat[i].reshape(3, 3).T
-        for i in geoms
-    ]
-    box, place = np.concatenate(points) @ R, data.xpos[body.index] @ R
-    over = np.maximum(box.min(axis=0) - place, place - box.max(axis=0)).max()
-    if over > body.fields["size"][0]:
-        raise InputError(f"thruster '{body.name}' is {over:.3g} m outside the hull; at most its size is allowed")
 
 
 def _on_a_shaft(model: mujoco.MjModel, body: int) -> bool:

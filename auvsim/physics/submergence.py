@@ -1,4 +1,4 @@
-"""How much of a hull, fin or propeller is under the surface, as compiled functions."""
+"""How much of a hull, fin, propeller or thruster is under the surface, as compiled functions."""
 
 import math
 
@@ -11,7 +11,8 @@ _STRIP_X, _STRIP_VOLUME = HULL["strip_x"][0], DERIVED["strip_volume"][0]
 _STRIP_RADIUS, _STRIP_HALF = DERIVED["strip_radius"][0], DERIVED["strip_half_length"][0]
 _REACH = DERIVED["reach"][0]
 
-_inline = njit(cache=True, inline="never", error_model="numpy", fastmath=False)
+# Not cached by itself: offsets come from `forces`, whose changes numba would not see here.
+_inline = njit(inline="never", error_model="numpy", fastmath=False)
 
 
 @_inline

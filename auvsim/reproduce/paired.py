@@ -6,7 +6,7 @@ from itertools import groupby
 from typing import Any
 
 from auvsim.base.tasks import Task
-from auvsim.reproduce.paper1.runs import Track, Way
+from auvsim.reproduce.paper1.runs import Track, Trajectory
 from auvsim.reproduce.paper1.study import Result, Row, Score, score, summarise
 
 REFERENCE = "paper"  # the filter by which the others' errors are divided
@@ -43,7 +43,7 @@ def score_tasks(
     return tasks
 
 
-def scores(rows: Mapping[str, Row], run: Way, tracks: Mapping[str, Track]) -> dict[str, dict[str, Score]]:
+def scores(rows: Mapping[str, Row], run: Trajectory, tracks: Mapping[str, Track]) -> dict[str, dict[str, Score]]:
     """By row and filter, of tracks by filter, of one run."""
     return {name: {key: score(row, run, followed) for key, followed in tracks.items()} for name, row in rows.items()}
 

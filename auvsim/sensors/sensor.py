@@ -43,8 +43,8 @@ class Sensor(ABC):
     """A sensor on board; one file and one test add another.
 
     A subclass names its `kind` and `Settings` (with a `rate` [Hz], and `enabled` if a vehicle may lack it), says in
-    `value` and `sizes` what it logs, and implements `measure`. It takes the same number of draws from `_noise` for every
-    reading, so that a run replays bit for bit and no loss changes other noise.
+    `value` and `sizes` what it logs, and implements `measure`. For every reading it takes the same number of draws from
+    `_noise`, so that a run replays bit for bit and no loss changes other noise.
 
     Args:
         settings: of the class `Settings`.

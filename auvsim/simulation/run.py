@@ -67,8 +67,8 @@ def run(
     started = wall.perf_counter()
     if check_step:
         check_steps(scenario)
-    simulation = Simulation(scenario, seed, trial, path=path)
-    log, status = simulation.log, "complete"
+    simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
+    log: Any = simulation.log
     with log:
         try:
             last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)

@@ -77,7 +77,7 @@ def _other(name: str, values: Any) -> Settings:
     kind = values.get("kind") if isinstance(values, dict) else None
     if kind is None:
         known = [*SensorSettings.model_fields]
-        raise schema.UnknownKey(name, known, "; any other sensor has a name of its own and a `kind`")
+        raise schema.UnknownKeyError(name, known, "; any other sensor has a name of its own and a `kind`")
     model = OwnSensor if ":" in str(kind) else OTHERS.get(str(kind))
     if model is None:
         raise ValueError(f"{name}.kind: no sensor '{kind}'; there are {', '.join(OTHERS)}, package.module:Class")

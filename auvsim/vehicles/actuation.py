@@ -100,12 +100,12 @@ class FinsAndShaft:
             if not low < 0.0 < high:
                 raise InputError(f"the limits of '{channel}' are {low:g} and {high:g}; they must enclose 0")
 
-    @cached_property
+    @property
     def channels(self) -> tuple[str, ...]:
         """Fin actuators, then `shaft`."""
         return (*self.fins, "shaft")
 
-    @cached_property
+    @property
     def units(self) -> tuple[str, ...]:
         """Units of the channels."""
         return (*("rad" for _ in self.fins), "rad/s")

@@ -23,7 +23,7 @@ from auvsim.video.canvas import Picture
 from auvsim.video.motion import Motion
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage
-from auvsim.video.storyboard import NEAR, Frame, storyboard, verdict
+from auvsim.video.storyboard import Frame, looked_at, storyboard, verdict
 
 __all__ = ["DrawingError", "render", "still"]
 
@@ -105,11 +105,9 @@ def still(
     docking = next((motion for motion in playback.motions.values() if np.isfinite(motion.ranges).any()), None)
     if time is None:
         time = _just_before(docking) if docking else playback.end
-    moment = playback.at(time)
-    ranges = {name: now.range for name, now in moment.vehicles.items() if now.range < NEAR}
-    focus = min(ranges, key=lambda name: ranges[name]) if ranges else None
+    focus = looked_at(playback, time)
     banner = verdict(playback) if time >= playback.end else ""
-    frame = Frame(time=time, speed=0.0, near=bool(ranges), banner=banner, focus=focus)
+    frame = Frame(time=time, speed=0.0, near=focus is not None, banner=banner, focus=focus)
     try:
         with Stage(playback, width, height, cameras, samples=4) as stage, whole(Path(path)) as partial:
             _save_png(stage.picture(frame, 0.0), partial)

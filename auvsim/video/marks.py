@@ -39,28 +39,28 @@ class Tracks:
     colour: Colour  # of the true one
     true: Array  # (n, 3) corners
     true_times: Array
-    believed: Array
-    believed_times: Array
+    estimated: Array
+    estimated_times: Array
     marks: list[Mark]
 
     @classmethod
     def of(cls, motion: Motion, colour: Colour, spacing: float, dot: float) -> "Tracks":
         """The tracks with corners at least `spacing` apart, and the fixes as dots of half width `dot` [m]."""
         true = _thin(motion.positions, spacing)
-        believed = _thin(motion.belief_positions, spacing)
+        estimated = _thin(motion.belief_positions, spacing)
         corners = motion.positions[true], motion.times[true]
-        beliefs = motion.belief_positions[believed], motion.belief_times[believed]
+        beliefs = motion.belief_positions[estimated], motion.belief_times[estimated]
         marks = [*_polyline(*corners, 3.0, colour), *_polyline(*beliefs, 2.0, ESTIMATE)]
         fixes = motion.received_fixes()
         for time, place, reason in zip(fixes.times, fixes.places, fixes.reasons, strict=True):
             marks.append(Mark(float(time), DOT, dot, place, place, REFUSED if reason else FIX))
-        true, believed = corners, beliefs
+        true, estimated = corners, beliefs
         return cls(
             colour=colour,
             true=true[0],
             true_times=true[1],
-            believed=believed[0],
-            believed_times=believed[1],
+            estimated=estimated[0],
+            estimated_times=estimated[1],
             marks=marks,
         )
 
@@ -68,7 +68,7 @@ class Tracks:
         """Draws both tracks from their last corner to where they are now."""
         _tip(layer, self.true, self.true_times, time, now.position, 3.0, self.colour)
         if now.belief is not None:
-            _tip(layer, self.believed, self.believed_times, time, now.belief.position, 2.0, ESTIMATE)
+            _tip(layer, self.estimated, self.estimated_times, time, now.belief.position, 2.0, ESTIMATE)
 
 
 def colour_of(playback: Playback, vehicle: str) -> Colour:

@@ -26,6 +26,7 @@ class Belief:
     position: Array  # (3,) [m]
     heading: float  # [rad]
     covariance: Array  # (2, 2) of north, east [m2]
+    age: float  # time since the last estimate of all [s]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -169,6 +170,7 @@ class Motion:
             position=(1.0 - weight) * self.belief_positions[index] + weight * self.belief_positions[after],
             heading=float((1.0 - weight) * self._belief_headings[index] + weight * self._belief_headings[after]),
             covariance=self._covariances[index],
+            age=max(time - float(self.belief_times[-1]), 0.0),
         )
 
 

@@ -12,6 +12,7 @@ from auvsim.video.overlay import GREY, PANEL, WHITE, Style, darken, fill, rgb, s
 from auvsim.video.playback import Moment, Playback
 
 WIDTH, HEIGHT = 416, 252  # size for which it is laid out [pixels]
+HELD = 2.0  # time without an estimate after which its last error says nothing [s]
 ROWS = 4  # vehicles that find room in it
 
 
@@ -131,8 +132,10 @@ def _range(now: VehicleMoment) -> str:
 
 
 def error(now: VehicleMoment) -> str:
-    """Distance of the estimated position from the true one, depth included."""
-    return "no fix yet" if now.belief is None else f"{math.dist(now.belief.position, now.position):.2f} m"
+    """Distance of the estimated position from the true one, depth included; held fast, a vehicle estimates nothing."""
+    if now.belief is None:
+        return "no fix yet"
+    return f"{math.dist(now.belief.position, now.position):.2f} m" if now.belief.age < HELD else "–"
 
 
 def _current(now: VehicleMoment) -> str:

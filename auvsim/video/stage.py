@@ -111,7 +111,8 @@ class Stage:
             overlay.label(picture, "AUV" if playback.lone else name, place, colour, scale)
         for name, dock in playback.docks.items():
             text = "dock" if len(playback.docks) == 1 else name
-            overlay.label(picture, text, project(scene, dock.mouth + above, box), overlay.rgb(marks.DOCK), scale)
+            place = dock.mouth + above if playback.lone else dock.mouth - 1.3 * above  # clear of a vehicle in it
+            overlay.label(picture, text, project(scene, place, box), overlay.rgb(marks.DOCK), scale)
 
     def _name(self, view: str, moment: Moment) -> str:
         """What stands in the corner of a view."""

@@ -70,6 +70,17 @@ def near_dock(motion: Motion) -> NDArray[np.bool_]:
     return (motion.ranges < NEAR) & (motion.times <= motion.over_at() + AFTER)
 
 
+def looked_at(playback: Playback, time: float) -> str | None:
+    """The vehicle that is looked at near its dock at a time, the nearest one; None where none is."""
+    moment = playback.at(time)
+    near = {
+        name: now.range
+        for name, now in moment.vehicles.items()
+        if now.range < NEAR and time <= playback.motions[name].over_at() + AFTER
+    }
+    return min(near, key=lambda name: near[name]) if near else None
+
+
 def speed_ups(motion: Motion, near: NDArray[np.bool_], lapse: float) -> Array:
     """Speed-up (n,) at the samples of the truth that suits one vehicle: slow near the dock, slowest where it docks."""
     times = motion.times
@@ -114,20 +125,20 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
 def verdict(playback: Playback) -> str:
     """How the run ended, in a line; of several vehicles, how each did."""
     if playback.lone:
-        end, attempt = _end_of(playback.first), playback.first.at(playback.end).count
+        end, attempt = _end_of(playback.first, "after"), playback.first.at(playback.end).count
         return f"{end}, attempt {attempt}" if end.startswith("docked") else end
-    ends = {name: _end_of(motion) for name, motion in playback.motions.items()}
-    return "; ".join(f"{name} {text}" for name, text in ends.items())
+    ends = {name: _end_of(motion, "at") for name, motion in playback.motions.items()}
+    return ", ".join(f"{name} {text}" for name, text in ends.items())
 
 
-def _end_of(motion: Motion) -> str:
+def _end_of(motion: Motion, preposition: str) -> str:
     log = motion.log
     kinds, texts, times = log["event"]["kind"], log["event"]["text"], log["event"]["time"]
     for kind, text, time in zip(kinds[::-1], texts[::-1], times[::-1], strict=True):
         if kind == "docked":
-            return f"docked after {time:.0f} s"
+            return f"docked {preposition} {time:.0f} s"
         if kind == "done":
-            return f"finished after {time:.0f} s"
+            return f"finished {preposition} {time:.0f} s"
         if kind in ("aborted", "timeout", "diverged", "interrupted", "manoeuvre"):
             return f"{kind}: {text}"
     wanted = "docked" if AT_REST in motion.phase_names else "finished"

@@ -76,7 +76,7 @@ def build_current(settings: CurrentSettings, generator: Generator, duration: flo
         case WavesSettings():
             return Waves(settings, generator)
         case GridSettings():
-            return Grid.read(settings)
+            return Grid.read(settings, duration)
         case SumSettings():
             children = generator.spawn(len(settings.terms))
             return Sum([build_current(*pair, duration) for pair in zip(settings.terms, children, strict=True)])

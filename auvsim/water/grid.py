@@ -43,13 +43,17 @@ class Grid:
         self._slopes = [_slopes(axis) for axis in axes]
 
     @classmethod
-    def read(cls, settings: GridSettings) -> "Grid":
-        """The grid of a file.
+    def read(cls, settings: GridSettings, duration: float) -> "Grid":
+        """The grid of a file, for a duration [s].
 
         Raises:
-            InputError: the file cannot be used.
+            InputError: the file cannot be used, or ends before the duration and is not to be held.
         """
         found = grid_file.read(settings)
+        last = float(found.axes[0][-1]) - settings.start
+        if settings.outside == "refuse" and found.axes[0].size > 1 and last < duration:
+            text = f"{last:g} s of currents from the start on, {duration:g} s are needed; or set outside: hold"
+            raise InputError(f"{settings.file}: {text}")
         return cls(found.axes, found.velocity, settings.outside, settings.start)
 
     def _weights(self, axis: int, at: float) -> tuple[int, Array]:

@@ -124,7 +124,9 @@ class WakeSettings(Settings):
     speed: float = Field(default=0.5, ge=0.0, description="speed of the undisturbed current [m/s]")
     direction_deg: float = Field(default=0.0, description="direction it flows to, clockwise from north [deg]")
     drag_area: float = Field(default=1.0, gt=0.0, description="drag coefficient times frontal area [m2]")
-    lee: float = Field(default=0.6, gt=0.0, lt=1.0, description="share of the current lost in the lee, on the axis [-]")
+    lee: float = Field(
+        default=0.6, gt=0.0, lt=1.0, description="share of the current lost on the axis, before the wake widens [-]"
+    )
     growth: float = Field(default=0.05, gt=0.0, lt=1.0, description="growth of the wake's width per metre [-]")
 
 

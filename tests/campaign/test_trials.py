@@ -147,15 +147,13 @@ def test_one_trial_again(
     ("pins", "text"),
     [
         ({"estimator": {"kind": "no.where:factory"}}, "variant 'b': estimator 'no.where:factory': ModuleNotFound"),
-        ({"vehicle": {"model": "remus"}}, "variant 'b': no vehicle 'remus'; there are "),
-        ({"vehicle": {"start": {"depth": 100.0}}}, "variant 'b': start depth 100 m is not between"),
+        ({"vehicle": {"model": "remus"}}, "no vehicle 'remus'; there are "),
+        ({"vehicle": {"start": {"depth": 100.0}}}, "variant 'b': vehicle 'remus100': start depth 100 m is not between"),
     ],
 )
 def test_what_cannot_be_set_up_is_refused_before_anything_runs(pins: dict, text: str, tmp_path: Path) -> None:
     """No trial has run then, and no folder is left."""
     from auvsim.campaign import trials
-
-    wrong = plan.parse({"trials": 2, "variants": {"a": {}, "b": pins}})
 
     class Here:
         name, jobs = "here", 1
@@ -165,7 +163,7 @@ def test_what_cannot_be_set_up_is_refused_before_anything_runs(pins: dict, text:
             yield from ((task, function(task)) for task in tasks)
 
     with pytest.raises(InputError, match=text):
-        execution.run(wrong, tmp_path / "c", Here())
+        execution.run(plan.parse({"trials": 2, "variants": {"a": {}, "b": pins}}), tmp_path / "c", Here())
     assert list(tmp_path.iterdir()) == []
 
 

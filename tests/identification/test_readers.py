@@ -266,7 +266,7 @@ def test_strays_are_found_and_nothing_else() -> None:
             "heading": (t, record.measured[:, 2]),
         }
         given |= {name: (t, record.measured[:, MEASURED.index(name)]) for name in ("ground_surge", "ground_sway")}
-        assert np.array_equal(reckoning.strays(given, 0.5), wrong), seed
+        assert np.array_equal(reckoning.outliers(given, 0.5), wrong), seed
 
 
 def test_a_trial_log_is_read_as_the_vehicle_sensed_it(tmp_path: Path) -> None:
@@ -299,7 +299,7 @@ def test_a_trial_log_is_read_as_the_vehicle_sensed_it(tmp_path: Path) -> None:
 
 
 def test_docking_logs_leave_out_what_is_not_planar(tmp_path: Path) -> None:
-    """Steep dives and the time in the dock are barred; what is left is level and before the dock."""
+    """Steep dives and the time in the dock are excluded; what is left is level and before the dock."""
     plan = scenario.parse(
         sampling.draw(sampling.merge(sampling.default_plan(), {"vehicle": {"start": {"depth": 10.0}}}), 1)
     )
@@ -340,7 +340,7 @@ def test_another_vehicles_log_is_refused(tmp_path: Path) -> None:
 def test_strays_need_a_heading() -> None:
     """Positions alone are not judged."""
     t = np.arange(20.0)
-    assert not reckoning.strays({"north": (t, t), "east": (t, 100.0 * (t == 9))}, 0.5).any()
+    assert not reckoning.outliers({"north": (t, t), "east": (t, 100.0 * (t == 9))}, 0.5).any()
 
 
 def test_signals_without_positions_stay_as_they_are() -> None:

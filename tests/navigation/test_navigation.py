@@ -42,9 +42,7 @@ EXACT: dict[str, Any] = {
 NONE = Commands(0.0, 0.0, 0.0)
 
 
-def build(
-    name: str = "augmented_ekf", usbl: UsblSettings | None = None, rate: float = 10.0, **settings: Any
-) -> Any:
+def build(name: str = "augmented_ekf", usbl: UsblSettings | None = None, rate: float = 10.0, **settings: Any) -> Any:
     """An estimator that assumes the shipped vehicle's planar model, for a dock away from the datum."""
     setup = NavigatorSetup(
         vehicle="auv",

@@ -6,7 +6,7 @@ import pytest
 from bodies import DENSITY, RPM, body_force, command, motion, remus100, set_motion, set_water
 from scipy.spatial.transform import Rotation
 
-from auvsim.physics.forces import HULL, PROPELLER
+from auvsim.physics.forces import FIN, HULL, PROPELLER
 
 D, W, T, SWIRL = 0.14, 0.056, 0.1, 0.9
 KT, KQ = (0.4566, -0.4174), (0.07, -0.0585)
@@ -216,3 +216,44 @@ def test_induced_drag_of_the_hull_is_prandtls():
     lift = 28.6 * 1.5 * np.hypot(0.2, 0.1)
     drag = 10.0 * lift**2 / (0.5 * DENSITY * speed**2)
     assert forces[1] - forces[0] == pytest.approx([*(-drag * nu[:3] / speed), 0, 0, 0], abs=1e-9)
+
+
+def crash_stop(**numbers):
+    """Way [m] from 1.5 m/s to rest, shaft full astern."""
+    model = with_numerics(**numbers)
+    data = mujoco.MjData(model)
+    command(data, rpm=900.0)
+    set_motion(model, data, [1.5, 0, 0, 0, 0, 0], position=[0, 0, 20])
+    mujoco.mj_step(model, data, 3000)
+    start, _, nu = motion(model, data)
+    assert nu[0] == pytest.approx(1.5, abs=0.01)
+    command(data, rpm=-1525.0, at_once=False)
+    while motion(model, data)[2][0] > 0.0:
+        mujoco.mj_step(model, data)
+    return np.linalg.norm(motion(model, data)[0] - start)
+
+
+def test_crash_stop_is_as_long_as_the_readme_says():
+    assert crash_stop() == pytest.approx(1.81, abs=0.02)
+    assert crash_stop(astern_loss=0.3) == pytest.approx(1.97, abs=0.02)
+    assert crash_stop(astern_loss=0.3, power_limit=40.0) == pytest.approx(2.15, abs=0.02)
+
+
+def speed_lost(model):
+    """Share of the speed that a steady turn at 15 degrees of rudder and 1525 rpm takes."""
+    data = mujoco.MjData(model)
+    speeds = []
+    set_motion(model, data, [2.5, 0, 0, 0, 0, 0], position=[0, 0, 20])
+    for angle in (0.0, np.radians(15.0)):
+        command(data, angle, 0.0, 1525.0)
+        mujoco.mj_step(model, data, 5000)
+        speeds.append(np.linalg.norm(motion(model, data)[2][:3]))
+    return 1.0 - speeds[1] / speeds[0]
+
+
+def test_speed_lost_in_a_turn_is_as_the_readme_says():
+    assert speed_lost(with_numerics()) == pytest.approx(0.0046, abs=2e-4)
+    model = with_numerics(body_induced_drag=12.6)
+    for fin in ("rudder_upper", "rudder_lower", "plane_port", "plane_starboard"):
+        model.body_user[model.body(fin).id, FIN["induced_drag"][0]] = 2.0
+    assert speed_lost(model) == pytest.approx(0.0099, abs=2e-4)

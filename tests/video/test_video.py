@@ -29,7 +29,7 @@ from auvsim.video.marks import ESTIMATE, FIX, REFUSED, TRUE, Tracks, colour_of
 from auvsim.video.motion import PROPELLER_SLOWNESS
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage, layout
-from auvsim.video.storyboard import DOCKING, HOLD, LONGEST, RAMP, Frame, storyboard
+from auvsim.video.storyboard import DOCKING, HOLD, LONGEST, RAMP, Frame, looked_at, storyboard
 
 SMALL: dict[str, Any] = {"width": 320, "height": 240}
 
@@ -263,6 +263,7 @@ def test_the_panel_tells_the_error_in_space() -> None:
     moment = Playback(fleet_log()).at(50.0)
     assert panel.error(moment.vehicles["auv_3"]) == "1.30 m"
     assert panel.error(Playback(fleet_log()).at(1.0).vehicles["auv_1"]) == "no fix yet"
+    assert panel.error(Playback(fleet_log()).at(100.0).vehicles["auv_1"]) == "–"  # docked: nothing is estimated
 
 
 @pytest.fixture(scope="module")
@@ -299,7 +300,8 @@ def test_a_fleet_is_looked_at_where_it_docks(fleet: Playback) -> None:
     assert (at(53.0).near, at(53.0).focus, at(53.0).speed) == (True, "auv_1", DOCKING)
     assert (at(120.0).near, at(120.0).speed) == (False, 20.0)
     assert (at(200.5).near, at(200.5).focus) == (True, "auv_2")
-    assert frames[-1].banner == "auv_1 docked after 54 s; auv_2 docked after 201 s; auv_3 not finished (complete)"
+    assert frames[-1].banner == "auv_1 docked at 54 s, auv_2 docked at 201 s, auv_3 not finished (complete)"
+    assert [looked_at(fleet, time) for time in (53.0, 58.0, 120.0, 200.5)] == ["auv_1", "auv_1", None, "auv_2"]
     assert frames[0].banner == "start: 3 vehicles"
     assert any(frame.banner == "auv_1 docked: latched at 1.5 m/s" for frame in frames)
 

@@ -189,6 +189,10 @@ def test_a_classic_file_packed_turned_upward_and_in_other_units(tmp_path):
                 5.0,
             )
             variable[:] = np.round((100.0 * part.transpose(3, 1, 0, 2)[..., ::-1] - 5.0) / 0.01).astype(np.int16)
+    assert "240 s of currents from the start on, 300 s are needed; or set outside: hold" in refusal(
+        path, duration=300.0
+    )
+    assert "140 s of currents from the start on, 200 s are needed" in refusal(path, start=100.0)
     grid = build({"kind": "grid", "file": str(path)})
     for time, depth, north, east in ((0.0, 0.0, -40.0, 80.0), (100.0, 7.0, 11.0, -3.0)):
         water = grid.evaluate(time, np.array([north, east, depth]))
@@ -210,9 +214,9 @@ def test_geographic_coordinates_are_metres_of_the_datum(tmp_path):
     assert grid.evaluate(0.0, np.array([0.0, 558.0, 2.0])).velocity == pytest.approx([0.0, 0.1, 0.0], abs=1e-5)
 
 
-def refusal(path, **settings):
+def refusal(path, duration=200.0, **settings):
     with pytest.raises(InputError) as caught:
-        build({"kind": "grid", "file": str(path), **settings})
+        build({"kind": "grid", "file": str(path), **settings}, duration=duration)
     assert "\n" not in str(caught.value)
     assert str(path) in str(caught.value)
     return str(caught.value)

@@ -1,4 +1,4 @@
-"""What a report is about: the campaign, its trials, and what they come to."""
+"""Content of a report: the campaign, its trials and their statistics."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence

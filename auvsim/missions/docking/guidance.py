@@ -207,7 +207,7 @@ class Docking(Mission):
         if self.phase in (Phase.DOCKED, Phase.ABORTED):
             return Setpoints(heading, depth, 0.0)
         if self._occupant is not None:
-            self._enter(Phase.ABORTED, time, f"dock '{self.dock.name}' is occupied by '{self._occupant}'")
+            self._enter(Phase.ABORTED, time, f"the dock is occupied by '{self._occupant}'")
             return Setpoints(heading, depth, 0.0)
         silence = time - self._last_fix
         if silence > self._s.lost_timeout:
