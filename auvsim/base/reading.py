@@ -1,4 +1,4 @@
-"""The one shape in which anything measured on board or received reaches navigation, control and the log."""
+"""A reading: the form in which anything measured or received reaches navigation, control and the log."""
 
 from typing import NamedTuple
 

@@ -202,7 +202,7 @@ def manoeuvres(found: Sequence[Figures]) -> None:
 
 
 def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", room: float) -> None:
-    """Prints what manoeuvres of one duration would tell of parameters as one table, a column each."""
+    """Prints the information of manoeuvres of one duration on the parameters as one table, a column each."""
     table = Table("", title="expected standard deviation of each parameter [% of its value]")
     for name in outcomes:
         table.add_column(name, justify="right")

@@ -1,4 +1,4 @@
-"""The physical world: steps MuJoCo with n vehicles and n structures in the water, owns their state, gives `Truth`."""
+"""The physical world: n vehicles and n structures in the water, stepped by MuJoCo; gives their true states."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -20,7 +20,7 @@ from auvsim.water.currents import CurrentField
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
 NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
-LOOKOUT = 0.25  # longest time between two looks at these distances [s]
+LOOKOUT = 0.25  # longest time between two checks of these distances [s]
 
 
 class StructureState:

@@ -1,4 +1,4 @@
-"""One vehicle's mind: its sensors, estimator, mission and controller, and one turn of each."""
+"""The agent of one vehicle: its sensors, estimator, mission and controller, and one step of each."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -30,7 +30,7 @@ from auvsim.vehicles.library import Vehicle
 
 
 class Log(Protocol):
-    """Where an agent writes down what happens to it; `data.recorder.Recorder` is one."""
+    """What an agent logs to; `data.recorder.Recorder` is one."""
 
     def append(self, group: str, row: Sequence[Any]) -> None:
         """A row of a group."""
@@ -184,7 +184,7 @@ class Agent:
         self._to_filter += self._readings
         self._to_mission += self._readings
         self._messages_to_filter += self._messages
-        # Held fast, the vehicle does not move as any model of free motion says: nothing is estimated.
+        # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
         with self._mission:
             at_rest = self.mission.at_rest
         if ticks % self._filter_ticks or at_rest:

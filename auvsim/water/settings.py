@@ -42,7 +42,7 @@ class TurningSettings(Settings):
 
 
 class ApproachTurnSettings(Settings):
-    """A uniform current that turns once in every docking attempt, somewhere on its approach: the hard case."""
+    """A uniform current that turns once in every docking attempt, somewhere on its approach."""
 
     kind: Literal["approach_turn"] = "approach_turn"
     speed: float = Field(default=0.5, ge=0.0, description="horizontal speed [m/s]")
@@ -104,7 +104,7 @@ class BoundaryLayerSettings(Settings):
     speed: float = Field(default=0.5, ge=0.0, description="horizontal speed above the layer [m/s]")
     direction_deg: float = Field(default=0.0, description="direction it flows to, clockwise from north [deg]")
     floor: float = Field(default=40.0, gt=0.0, description="depth of the sea floor [m]")
-    thickness: float = Field(default=10.0, gt=0.0, description="height to which the floor is felt [m]")
+    thickness: float = Field(default=10.0, gt=0.0, description="thickness of the layer above the sea floor [m]")
     roughness: float = Field(default=0.005, gt=0.0, description="roughness length z_0: sand ripples 0.002 to 0.006 [m]")
 
     @model_validator(mode="after")

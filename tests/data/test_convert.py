@@ -80,7 +80,7 @@ def test_every_value_of_format_2_is_found_again(name: str, tmp_path: Path):
         for column in ("time", "kind", "text"):
             values = old[f"event/{column}"]
             values = values.asstr()[...] if column != "time" else values[...]
-            assert log.groups["event"][name].tolist() == values.tolist()
+            assert log.groups["event"][column].tolist() == values.tolist()
         bare = np.dtype(">f4")  # dimensions without values
         assert seen == {f"{g}/{v}" for g, group in old.items() for v, item in group.items() if item.dtype != bare}
     assert len(truth["time"]) > 5
