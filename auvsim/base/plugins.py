@@ -6,6 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
+from pydantic import ValidationError
+
+from auvsim.base import schema
 from auvsim.base.errors import InputError, unknown_name
 
 Part = TypeVar("Part")
@@ -41,6 +44,17 @@ def find(what: str, name: str, shipped: Mapping[str, Part]) -> Part | Any:
         raise InputError(f"{what} '{name}': {type(error).__name__}: {error}") from None
 
 
+def require(what: str, made: Any, *names: str) -> None:
+    """Sees that a part that was made has all that its contract names.
+
+    Raises:
+        InputError: it lacks something.
+    """
+    lacks = [name for name in names if not hasattr(made, name)]
+    if lacks:
+        raise InputError(f"{what} made a {type(made).__name__} without {', '.join(lacks)}")
+
+
 def settings_of(part: Any, given: Mapping[str, Any], where: str) -> Any:
     """The settings of a user's own part: checked by its class `Settings` if it has one, else as they were given.
 
@@ -52,5 +66,7 @@ def settings_of(part: Any, given: Mapping[str, Any], where: str) -> Any:
         return dict(given)
     try:
         return of_its_own(**given)
+    except ValidationError as error:
+        raise schema.explain(error, of_its_own, given, {"": where}) from None
     except Exception as error:  # of pydantic, or whatever a class of the user's own raises
         raise InputError(f"{where}: {' '.join(str(error).split())[:300]}") from None

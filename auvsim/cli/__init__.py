@@ -11,6 +11,7 @@ import tyro
 
 from auvsim import __version__
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.base.neighbours import check_estimators
 from auvsim.cli.parsing import parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
@@ -245,6 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    check_estimators()
     if arguments[:1] == ["study"]:  # each study has options of its own
         from auvsim.cli import study
 

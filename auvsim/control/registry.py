@@ -35,8 +35,10 @@ def build(kind: str, setup: ControllerSetup) -> Controller:
         where = f"controller '{kind}': settings"
         setup = replace(setup, settings=plugins.settings_of(made, setup.settings.settings, where))
     try:
-        return made(setup)
+        part = made(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"controller '{kind}' cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"controller '{kind}'", part, "observe", "command", "heading", "depth")
+    return part

@@ -49,8 +49,10 @@ def build(kind: str, setup: MissionSetup) -> Mission:
     if plugins.is_own(kind):
         setup = replace(setup, settings=plugins.settings_of(made, setup.settings.settings, f"mission '{kind}'"))
     try:
-        return made(setup)
+        part = made(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"mission '{kind}' cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"mission '{kind}'", part, "phases", "phase", "variables", "finished", "events", "update", "row")
+    return part

@@ -178,7 +178,34 @@ def load(name: str, vehicle: str) -> PlanarParameters:
     wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
     if found.vehicle != wanted:
         raise InputError(f"{path}: these are parameters of '{found.vehicle}', not of '{wanted}'")
-    return found.planar()
+    parameters = found.planar()
+    _check(parameters, path)
+    return parameters
+
+
+def _check(p: PlanarParameters, path: Path) -> None:
+    """Sees that a vehicle of these parameters has inertia in every direction and is slowed by its drag.
+
+    Raises:
+        InputError: It has not; the text names the parameter or the sum at fault.
+    """
+    positive = {
+        "m": p.m,
+        "I_z": p.I_z,
+        "m - X_ud": p.m - p.X_ud,
+        "m - Y_vd": p.m - p.Y_vd,
+        "I_z - N_rd": p.I_z - p.N_rd,
+    }
+    for name, value in positive.items():
+        if not value > 0.0:
+            raise InputError(f"{path}: parameters: {name} is {value:g}; it must be above 0")
+    coupled = (p.m * p.x_g - p.Y_rd) * (p.m * p.x_g - p.N_vd)
+    if not (p.m - p.Y_vd) * (p.I_z - p.N_rd) > coupled:
+        sum_of = "m, x_g, I_z, Y_vd, Y_rd, N_vd, N_rd"
+        raise InputError(f"{path}: parameters: the inertia in sway and yaw ({sum_of}) is not positive definite")
+    for name, value in (("X_uu", p.X_uu), ("X_u", p.X_u)):
+        if value > 0.0:
+            raise InputError(f"{path}: parameters: {name} is {value:g}; drag is negative here")
 
 
 def assumed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:

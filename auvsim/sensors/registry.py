@@ -7,6 +7,7 @@ from numpy.random import Generator
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.data.variables import Variable
 from auvsim.sensors.compass import Compass
 from auvsim.sensors.depth import Depth
 from auvsim.sensors.dvl import Dvl
@@ -44,8 +45,12 @@ def build(kind: str, settings: Any, generator: Generator, *, name: str, vehicle:
     """
     made = find(kind)
     try:
-        return made(settings, generator, name=name, vehicle=vehicle)
+        sensor = made(settings, generator, name=name, vehicle=vehicle)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"sensor '{name}' ({kind}) cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"sensor '{name}' ({kind})", sensor, "name", "value", "sizes", "measure")
+    if not isinstance(sensor.value, Variable):
+        raise InputError(f"sensor '{name}' ({kind}): value is {sensor.value!r}, not the Variable that the log holds")
+    return sensor

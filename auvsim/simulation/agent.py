@@ -22,6 +22,8 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
 from auvsim.sensors.sensor import Surroundings
+from auvsim.simulation import parts
+from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board, rated
 from auvsim.vehicles.library import Vehicle
@@ -115,9 +117,17 @@ class Agent:
             ),
         )
         self.sensors = [
-            (_sensor(key, found, noise(key), vehicle), round(rates.control / found.rate))
+            (
+                _sensor(key, found, noise(key), vehicle),
+                round(rates.control / found.rate),
+                Part("sensor", getattr(found, "kind", key), name),
+            )
             for key, found in on_board(settings.sensors)
         ]
+        # Whatever is given in place of the scenario's part is the caller's, who sees what it raises.
+        self._estimator = Part("estimator", "" if navigator else assumed.kind, name)
+        self._mission = Part("mission", "" if mission else settings.mission.kind, name)
+        self._controller = Part("controller", settings.control.kind, name)
         self.estimate: Estimate | None = None
         self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
         self._filter_ticks = round(rates.control / rates.filter)
@@ -136,7 +146,8 @@ class Agent:
             usbl: variables and sizes of the dock's USBL, if one serves the vehicle.
         """
         actuation = self.vehicle.actuation
-        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _ in self.sensors} | ({"usbl": usbl} if usbl else {})
+        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _, _ in self.sensors}
+        of_sensors |= {"usbl": usbl} if usbl else {}
         return vehicle_groups(
             sensors=of_sensors,
             mission=(self.mission.phases, self.mission.variables),
@@ -148,8 +159,14 @@ class Agent:
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
         """Takes the readings that are due at a control tick."""
         self._readings, self._messages = [], []
-        for sensor, every in self.sensors:
-            if ticks % every == 0 and (reading := sensor.measure(truth, world)) is not None:
+        for sensor, every, part in self.sensors:
+            if ticks % every:
+                continue
+            with part:
+                reading = sensor.measure(truth, world)
+                if reading is not None:
+                    part.check(parts.reading, reading, sensor)
+            if reading is not None:
                 log.reading(self.name, reading)
                 self._readings.append(reading)
 
@@ -162,14 +179,19 @@ class Agent:
 
     def navigate(self, ticks: int, time: float, log: Log) -> None:
         """Hands all that arrived to the controller and, when it is due, to the estimator."""
-        self.controller.observe(self._readings)
+        with self._controller:
+            self.controller.observe(self._readings)
         self._to_filter += self._readings
         self._to_mission += self._readings
         self._messages_to_filter += self._messages
         # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
-        if ticks % self._filter_ticks or self.mission.at_rest:
+        with self._mission:
+            at_rest = self.mission.at_rest
+        if ticks % self._filter_ticks or at_rest:
             return
-        e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+        with self._estimator as part:
+            e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+            part.check(parts.estimate, e, len(self.navigator.states))
         self._to_filter, self._messages_to_filter = [], []
         for kind, text in estimator_events(self.estimate, e):
             log.event(time, self.name, kind, text)
@@ -182,13 +204,20 @@ class Agent:
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""
         mission, controller = self.mission, self.controller
-        heading, depth = controller.heading, controller.depth
+        with self._controller as part:
+            heading, depth = controller.heading, controller.depth
+            part.check(parts.smoothed, heading, depth)
         if heading is None or depth is None:
             return None
         readings, self._to_mission = self._to_mission, []
-        wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
-        self.commands = controller.command(wanted)
-        log.append(self._path("mission"), (time, mission.phase, *wanted[:3], *mission.row()))
+        with self._mission as part:
+            wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
+            part.check(parts.mission, mission, wanted)
+            row = mission.row()
+        with self._controller as part:
+            self.commands = controller.command(wanted)
+            part.check(parts.demand, self.commands, tuple(d.name for d in self.vehicle.actuation.demands))
+        log.append(self._path("mission"), (time, mission.phase, *wanted[:3], *row))
         log.append(self._path("command"), (time, *self.commands))
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
@@ -197,6 +226,17 @@ class Agent:
             self._end = time + mission.aftermath
         self.over = time >= self._end
         return self.commands
+
+    @property
+    def approach(self) -> int | None:
+        """Number of the mission's approach under way, see `Mission`."""
+        with self._mission:
+            return self.mission.approach
+
+    def overdue(self, duration: float) -> str:
+        """What the log says when the time limit [s] of the run ends the mission."""
+        with self._mission:
+            return str(self.mission.overdue(duration))
 
     def _path(self, group: str) -> str:
         return f"vehicles/{self.name}/{group}"

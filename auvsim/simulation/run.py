@@ -1,5 +1,6 @@
 """The one closed loop: the world moves; every agent senses, navigates and acts; all of it is logged."""
 
+import hashlib
 import math
 import os
 import time as wall
@@ -22,10 +23,11 @@ from auvsim.data.recorder import Recorder
 from auvsim.data.variables import run_groups
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics import scenes
+from auvsim.physics import scenes, soundness
 from auvsim.physics.truth import Truth
 from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
+from auvsim.simulation.parts import PartError
 from auvsim.simulation.scenario import Scenario, to_yaml
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField, build_current, listeners
@@ -47,6 +49,7 @@ def run(
     trial: int = 0,
     progress: Callable[[ProgressState], None] | None = None,
     path: str | os.PathLike[str] | None = None,
+    check_step: bool = True,
 ) -> Log:
     """Runs a scenario and returns its log, also when it diverges or is interrupted.
 
@@ -56,11 +59,14 @@ def run(
         trial: number of the run under that seed.
         progress: called about ten times a simulated minute.
         path: file of the log, which grows during the run; None keeps the log in memory.
+        check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
 
     Raises:
         InputError: a model, a part or a number of the scenario cannot be used.
     """
     started = wall.perf_counter()
+    if check_step:
+        check_steps(scenario)
     simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
     log: Any = simulation.log
     with log:
@@ -70,16 +76,17 @@ def run(
                 simulation.step()
                 if progress and simulation.ticks % simulation.progress_ticks == 0:
                     progress(simulation.progress())
+            for agent in simulation.agents:
+                if not agent.over:
+                    log.event(simulation.time, agent.name, "timeout", agent.overdue(scenario.duration))
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
+            if isinstance(error, PartError):
+                log.event(simulation.time, "", "traceback", error.trace)
         except KeyboardInterrupt:
             status = "interrupted"
             log.event(simulation.time, "", "interrupted", "stopped by the user")
-        if status == "complete":
-            for agent in simulation.agents:
-                if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", agent.mission.overdue(scenario.duration))
         simulation.log_contacts()
         return log.finish(status, wall_time=wall.perf_counter() - started)
 
@@ -148,6 +155,7 @@ class Simulation:
             place = np.array(scenario.start_position(name))
             self.place(name, place, math.radians(start.heading_deg), start.speed)
         self.log = self._recorder(seed, trial, path) if record else Unrecorded()
+        self._record_models()
         self._record_truths()
 
     @property
@@ -224,6 +232,14 @@ class Simulation:
                 impulse += contact.force * tick
                 self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
 
+    def _record_models(self) -> None:
+        """Writes down the text of every model, since its file may change or be elsewhere when the log is read."""
+        texts = {("vehicle", self.scenario.vehicles[a.name].model): a.vehicle.source for a in self.agents}
+        for name, place in self._places.items():
+            texts["structure", self.scenario.structures[name].model] = place.structure.source
+        for (kind, model), text in texts.items():
+            self.log.append("models", (0.0, kind, model, hashlib.sha256(text.encode()).hexdigest(), text))
+
     def _record_truths(self) -> None:
         for name, truth in self.truths.items():
             self.log.truth(name, truth)
@@ -232,7 +248,7 @@ class Simulation:
         """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
         if not self._listeners or agent.mission is None:
             return
-        attempt, dock = agent.mission.approach, agent.mission.dock
+        attempt, dock = agent.approach, agent.mission.dock
         if attempt is not None and dock is not None and agent is self.agents[0]:
             away = self.truths[agent.name].position[:2] - dock.pose.position[:2]
             for listener in self._listeners:
@@ -316,6 +332,16 @@ def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
     names = [*scenario.vehicles]
     source = f"{names[0]}/current" if len(names) == 1 else "water/current"
     return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
+
+
+def check_steps(scenario: Scenario) -> None:
+    """Sees that the physics step is short enough for every vehicle.
+
+    Raises:
+        InputError: it is too long; the text says which rate would do.
+    """
+    for model in {settings.model: None for settings in scenario.vehicles.values()}:
+        soundness.check_step(model, scenario.physics.integrator, scenario.rates.physics, scenario.water.density)
 
 
 def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> World:

@@ -19,9 +19,10 @@ from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
+from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w-]{0,63}$")]
+Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
 
 
 class DatumSettings(Settings):
@@ -156,6 +157,16 @@ class Scenario(Settings):
                 key = f"vehicles.{name}.start.structure"
                 raise ValueError(f"{key}: range and bearing are from a structure; name one of {self._known}, or give "
                                  "north and east")  # fmt: skip
+        return self
+
+    @model_validator(mode="after")
+    def _all_in_the_water(self) -> "Scenario":
+        floor = self.water.sea_floor
+        depths = [(f"structures.{name}.depth", structure.depth) for name, structure in self.structures.items()]
+        depths += [(f"vehicles.{name}.start.depth", vehicle.start.depth) for name, vehicle in self.vehicles.items()]
+        for key, depth in depths:
+            if not 0.0 < depth < floor:
+                raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
         return self
 
     @property

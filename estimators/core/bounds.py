@@ -5,7 +5,7 @@ D22 = E[Q^-1] + E[H' R^-1 H], expectations over sampled truths. It is a filter l
 bound of delayed, lost or shuffled measurements is that of what had arrived.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,9 +14,18 @@ from estimators.core import loops
 from estimators.core.ekf import Innovation
 from estimators.core.errors import NotPositiveDefiniteError
 from estimators.core.history import Input, Node
-from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel, Verdict, Verdicts
+from estimators.core.types import (
+    NO_MODEL,
+    Array,
+    Gaussian,
+    Measurement,
+    Models,
+    ProcessModel,
+    Verdict,
+    Verdicts,
+    model_of,
+)
 
-NO_MODEL = "no_model"  # why a measurement is refused of whose kind a filter knows nothing
 Truths = Callable[[float], Array]  # time [s] -> true states (k, n), one of each sampled trajectory
 
 
@@ -53,7 +62,7 @@ class PosteriorBound:
     def __init__(
         self,
         process: ProcessModel,
-        models: Mapping[str, MeasurementModel],
+        models: Models,
         truths: Truths,
         first: Callable[[Sequence[Node], int], Array | None],
         noise: Any = None,
@@ -93,9 +102,9 @@ class PosteriorBound:
         information = state.information.copy()
         verdicts = []
         for measurement in measurements:
-            if (model := self._models.get(measurement.kind)) is not None:
+            if (model := model_of(self._models, measurement)) is not None:
                 for x in (truths := self._truths(node_time)):
-                    H, R = model.jacobian(x), model.covariance(x, measurement)
+                    H, R = model.jacobian(x, measurement), model.covariance(x, measurement)
                     information += H.T @ np.linalg.solve(R, H) / len(truths)
             verdicts.append(Verdict(measurement, "" if model is not None else NO_MODEL))
         return BoundState(node_time, information, state.mean, verdicts=tuple(verdicts))

@@ -21,10 +21,11 @@ class Outliers:
     """Outliers of a sensor: their probability, and their errors as an equal mixture of normal distributions."""
 
     prior: float = 0.03  # probability of each measurement
-    deviations: tuple[float, ...] = (3.0, 15.0)  # of each component, in the measurement's unit
+    # Of each component, in the measurement's unit; where components differ, one tuple of all components instead.
+    deviations: tuple[float | tuple[float, ...], ...] = (3.0, 15.0)
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.prior < 1.0 and self.deviations and min(self.deviations) > 0.0):
+        if not (0.0 < self.prior < 1.0 and self.deviations and min(np.min(d) for d in self.deviations) > 0.0):
             raise ParameterError(f"prior {self.prior} must lie in 0..1 and deviations {self.deviations} above 0")
 
 
@@ -48,7 +49,7 @@ def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel,
     sound = math.log1p(-outliers.prior) + log_density(innovation.covariance, innovation.residual)
     share = math.log(outliers.prior / len(outliers.deviations))
     wrong = [
-        share + log_density(innovation.covariance + d * d * np.eye(innovation.residual.size), innovation.residual)
+        share + log_density(innovation.covariance + _spread(d, innovation.residual.size), innovation.residual)
         for d in outliers.deviations
     ]
     highest = max(sound, *wrong)
@@ -64,6 +65,19 @@ def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel,
         log_likelihood=highest + math.log(total),
         probability=p,
     )
+
+
+def _spread(deviation: float | tuple[float, ...], size: int) -> Array:
+    """Covariance (m, m) of an outlier's error.
+
+    Raises:
+        ParameterError: There are more or fewer deviations than components.
+    """
+    if isinstance(deviation, tuple):
+        if len(deviation) != size:
+            raise ParameterError(f"outliers' deviations {deviation} must be {size}, one of each component")
+        return np.diag(np.square(deviation))
+    return deviation * deviation * np.eye(size)
 
 
 def log_density(covariance: Array, residual: Array) -> float:

@@ -20,7 +20,7 @@ from estimators.core import loops
 from estimators.core.compiling import is_ready
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.kernels import step_kernels
-from estimators.core.types import Array
+from estimators.core.types import Array, ProcessModel
 
 Integrator = Literal["euler", "midpoint"]
 
@@ -181,7 +181,7 @@ def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: B
     loops.wrap(0.0)
 
 
-class PlanarProcess:
+class PlanarProcess(ProcessModel):
     """The planar vehicle as a ProcessModel, in substeps short enough for an explicit integrator.
 
     Args:
@@ -192,6 +192,8 @@ class PlanarProcess:
         max_substep: Longest substep [s].
         biases: Those in the state, of BIASES.
     """
+
+    angles = (2,)  # the heading
 
     def __init__(
         self,
@@ -250,12 +252,6 @@ class PlanarProcess:
         moved = np.array(points, dtype=float)
         self._move(moved, (float(u[0]), float(u[1])), self._p, dt, self._substeps(dt))
         return moved
-
-    def wrap_angles(self, mean: Array) -> Array:
-        """The same state with its heading in (-pi, pi]."""
-        wrapped = mean.copy()
-        wrapped[2] = loops.wrap(wrapped[2])
-        return wrapped
 
     def walk(self, start: Array, inputs: Array, step: float, increments: Array) -> Array:
         """A sampled trajectory (k + 1, n) in steps of `step` [s]; angles are not wrapped.
