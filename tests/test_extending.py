@@ -12,6 +12,7 @@ import yaml
 from auvsim.analysis.summary import summarise
 from auvsim.base.errors import InputError
 from auvsim.base.frames import wrap
+from auvsim.cli import report
 from auvsim.data.log import VehicleLog, read, write
 from auvsim.simulation import scenario
 from auvsim.simulation.run import run
@@ -85,7 +86,9 @@ def test_controller_turns_to_the_heading_and_holds_it(profile: VehicleLog) -> No
     assert profile["command"]["rudder"][0] < 0.0  # to port
 
 
-def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(profile: VehicleLog) -> None:
+def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(
+    profile: VehicleLog, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Phases, variables, events and metrics are all read off the log; it ends before the time limit."""
     mission, depth = profile["mission"], profile["truth"]["position"][:, 2]
     assert profile.phases == ("dive", "climb")
@@ -98,6 +101,10 @@ def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(profile: V
     summary = summarise(profile)
     assert summary["reached"] == 4
     assert summary["deepest"] == depth.max()
+    report.show(summary)
+    printed = capsys.readouterr().out
+    assert "Profile trial" in printed
+    assert re.search(rf"largest true depth \[m\] .* {depth.max():.3g} ", printed)
 
 
 @pytest.mark.parametrize(
