@@ -131,3 +131,18 @@ def test_a_part_that_is_not_there_is_named(folder: Path) -> None:
     values["mission"]["kind"] = "mine.profile:Nothing"
     with pytest.raises(InputError, match=r"mission 'mine\.profile:Nothing': AttributeError"):
         run(scenario.parse(values))
+
+
+def test_a_part_that_raises_ends_the_run_as_diverged_with_its_traceback(folder: Path) -> None:
+    """The log up to there is kept, and names the part."""
+    (folder / "mine" / "broken.py").write_text(
+        BLOCKS["mine/reckoning.py"].replace("        c, s = np", "        assert time < 5.0\n        c, s = np")
+    )
+    values = yaml.safe_load(BLOCKS["profile.yaml"])
+    values["estimator"]["kind"] = "mine.broken:DeadReckoning"
+    log = run(scenario.parse(values))
+    event = log.groups["event"]
+    assert log.attributes["status"] == "diverged"
+    assert 4.0 < log.vehicle()["truth"]["time"][-1] <= 5.0
+    assert any("mine.broken:DeadReckoning" in text for text in event["text"][event["kind"] == "diverged"])
+    assert any("assert time < 5.0" in text for text in event["text"][event["kind"] == "traceback"])
