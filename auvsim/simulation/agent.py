@@ -82,18 +82,6 @@ class Agent:
         self.shaft_speed = fitted.shaft_speed_for
         heading = math.radians(start.heading_deg)
         self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
-        self.navigator = navigator or estimators.build(
-            NavigatorSetup(
-                vehicle=name,
-                settings=assumed,
-                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
-                actuation=vehicle.actuation,
-                period=1.0 / rates.filter,
-                rates=dict(rated(settings.sensors)),
-                usbl=settings.sensors.usbl,
-                dock=places[self.dock].pose if self.dock else None,
-            )
-        )
         self.mission = mission or missions.build(
             settings.mission.kind,
             MissionSetup(
@@ -106,6 +94,18 @@ class Agent:
                 holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
                 structures=places,
             ),
+        )
+        self.navigator = navigator or estimators.build(
+            NavigatorSetup(
+                vehicle=name,
+                settings=assumed,
+                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
+                actuation=vehicle.actuation,
+                period=1.0 / rates.filter,
+                rates=dict(rated(settings.sensors)),
+                usbl=settings.sensors.usbl,
+                dock=places[self.dock].pose if self.dock else None,
+            )
         )
         self.controller = controllers.build(
             settings.control.kind,
