@@ -36,7 +36,7 @@ class LoneVehicle(Settings):
 class ShortScenario(Settings):
     """One run of one vehicle, with every number definite."""
 
-    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the run [s]")
+    duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
     datum: DatumSettings = DatumSettings()
     vehicle: LoneVehicle = LoneVehicle()
