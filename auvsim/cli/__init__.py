@@ -3,6 +3,7 @@
 import math
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,8 +11,8 @@ from typing import Annotated, Literal
 
 import tyro
 
-from auvsim import __version__
-from auvsim.base.errors import AuvsimError, InputError
+from auvsim import CACHE_NOTE, RENDERER_NOTE, __version__
+from auvsim.base.errors import AuvsimError, DrawingError, InputError
 from auvsim.base.neighbours import check_estimators
 from auvsim.cli.interruption import Interruption
 from auvsim.cli.parsing import parse
@@ -234,11 +235,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments == ["--version"]:
         print(f"auvsim {__version__}")
         return 0
+    if CACHE_NOTE:
+        print(f"auvsim: {CACHE_NOTE}", file=sys.stderr)
     with Interruption() as interruption:
         try:
             return _run(arguments)
         except AuvsimError as error:
-            print(f"auvsim: {' '.join(str(error).split())}", file=sys.stderr)
+            more = f"; {RENDERER_NOTE}" if isinstance(error, DrawingError) and RENDERER_NOTE else ""
+            print(f"auvsim: {' '.join(str(error).split())}{more}", file=sys.stderr)
             return error.exit_code
         except KeyboardInterrupt:
             pass
@@ -252,11 +256,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
         except MemoryError as error:
             print(f"auvsim: out of memory: {' '.join(str(error).split())}".rstrip(": "), file=sys.stderr)
             return 1
-        except Exception:
+        except Exception as error:
+            folder = _cache_at_fault(error)
+            if folder and not interruption.came:
+                text = " ".join(str(error).split())[:200]
+                print(
+                    f"auvsim: compiled code in {folder} cannot be read ({type(error).__name__}: {text}); delete its "
+                    ".nbi and .nbc files, or set NUMBA_CACHE_DIR to another folder",
+                    file=sys.stderr,
+                )
+                return 1
             if not interruption.came:
                 raise
     print("auvsim: interrupted", file=sys.stderr)
     return 130
+
+
+def _cache_at_fault(error: BaseException) -> str | None:
+    """The folder of compiled code, if that is what an error is about."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if Path(frame.f_code.co_filename).parts[-3:] == ("numba", "core", "caching.py"):
+            place = getattr(frame.f_locals.get("self"), "_cache_path", None)
+            if place is not None:
+                return str(place)
+    return None
 
 
 def _of_a_file(error: OSError) -> str:
