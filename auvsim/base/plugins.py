@@ -23,9 +23,9 @@ def find(what: str, name: str, shipped: Mapping[str, Part]) -> Part | Any:
     """A part by the name of a shipped one or as `package.module:Name`, looked for in the working folder too.
 
     Args:
-        what: is looked for, for errors: "estimator".
-        name: of it.
-        shipped: those that have names.
+        what: kind of part, for errors: "estimator".
+        name: of the part.
+        shipped: the shipped parts by name.
 
     Raises:
         InputError: there is none, or its module cannot be imported.

@@ -1,4 +1,4 @@
-"""Which OpenGL MuJoCo is to draw with; imports no MuJoCo, which decides when it is first imported."""
+"""Choice of the OpenGL with which MuJoCo draws, made before MuJoCo is first imported."""
 
 import ctypes
 import os
@@ -49,10 +49,10 @@ def choose_renderer(
     available: Callable[[str], bool] = loads,
     alive: Callable[[str], bool] = answers,
 ) -> str:
-    """Lets MuJoCo draw without a display where it can, and look for none where it cannot.
+    """Makes MuJoCo draw without a display where the libraries for that are there, and switches drawing off elsewhere.
 
-    Leaves alone what the user chose as far as it can work, desktops, and systems other than Linux. What cannot work is
-    turned off: MuJoCo would not even be imported.
+    Does nothing where the user chose a renderer that can work, on desktops whose display answers, and on systems other
+    than Linux. A choice that cannot work is switched off, since MuJoCo could not even be imported with it.
 
     Returns:
         Why the user's choice was not heeded; empty if it was.

@@ -1,4 +1,4 @@
-"""Variables of a log: what each group holds, said once; sensors, missions, vehicles and estimators add their own.
+"""Variables of a log: the tables of its groups, to which sensors, missions, vehicles and estimators add their own.
 
 A group of a log is a table of variables that share the axis `time`. The tables of this file hold for every vehicle;
 `vehicle_groups` completes them by what one vehicle's parts say of themselves.

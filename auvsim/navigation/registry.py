@@ -1,4 +1,4 @@
-"""The estimators by their kinds, and how one is made for a vehicle."""
+"""Registry of the estimators by kind."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""Condenses a vehicle's hydrodynamics to the planar rudder-driven model that estimators believe, and says how well."""
+"""Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics; gives the fit's error."""
 
 import math
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ _SAMPLES = 600
 
 @dataclass(frozen=True, kw_only=True)
 class PlanarFit:
-    """A planar model of a vehicle near one speed, with its error against the vehicle it came from."""
+    """A planar model of a vehicle near one speed, with its error relative to the vehicle to which it was fitted."""
 
     vehicle: str
     speed: float  # [m/s]
@@ -113,7 +113,7 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
         InputError: the speed is not positive, or the vehicle cannot reach it.
     """
     if not 0.0 < speed < 20.0:
-        raise InputError(f"cannot condense '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
+        raise InputError(f"no planar model of '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
     return _fit_model(vehicle, *library.source("vehicle", vehicle), speed, density)
 
 

@@ -1,4 +1,4 @@
-"""Compiled scenes of vehicles and structures, quickly: composed once for each fleet, then only moved and turned.
+"""Compiled scenes of vehicles and structures: composed once for each fleet, then only moved and turned.
 
 To compose a scene with PyMJCF takes a ninth of a whole trial, to move its structures and compile it again 5 ms. The
 compiled model is the same bit for bit.

@@ -1,4 +1,4 @@
-"""The sensors by their kinds, and how one is made for a vehicle."""
+"""Registry of the sensors by kind."""
 
 from collections.abc import Callable
 from typing import Any
@@ -34,11 +34,11 @@ def build(kind: str, settings: Any, generator: Generator, *, name: str, vehicle:
     """Makes a sensor of a vehicle.
 
     Args:
-        kind: of it.
-        settings: of its class; of a user's own, what stands under `settings`.
-        generator: of its noise.
-        name: of this instance.
-        vehicle: that carries it.
+        kind: of the sensor.
+        settings: an instance of its settings class; for a user's own, what stands under `settings`.
+        generator: random stream of its noise.
+        name: instance name.
+        vehicle: model of the vehicle that carries it.
 
     Raises:
         InputError: there is no such kind, or a user's own cannot be made.

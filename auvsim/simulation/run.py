@@ -34,7 +34,7 @@ from auvsim.water.currents import CurrentField, build_current, listeners
 
 
 class ProgressState(NamedTuple):
-    """How far a running simulation is."""
+    """Progress of a running simulation."""
 
     time: float  # [s]
     duration: float  # its time limit [s]
@@ -58,7 +58,7 @@ def run(
         seed: of all random streams.
         trial: number of the run under that seed.
         progress: called about ten times a simulated minute.
-        path: where the log is to stand, written as it grows; None keeps it in memory.
+        path: file of the log, which grows during the run; None keeps the log in memory.
         check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
 
     Raises:
@@ -78,7 +78,7 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", agent.overdue(scenario.duration))
+                    log.event(simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration))
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
@@ -92,15 +92,15 @@ def run(
 
 
 class Simulation:
-    """The parts of a run, and one turn of its loop, of one control period.
+    """The parts of a run, and its loop, one control period a step.
 
     Args:
         scenario: every number definite.
         seed: of all random streams.
         trial: number of the run under that seed.
-        world: in place of MuJoCo's with the scenario's models: anything with its methods.
-        navigators: in place of the scenario's, by vehicle.
-        missions: likewise.
+        world: replaces MuJoCo's world; anything with the methods of `World`.
+        navigators: replace the scenario's estimators, by vehicle.
+        missions: replace the scenario's missions, by vehicle.
         agents: makes the agent of a vehicle, see `Agent`.
         record: whether anything is logged.
         path: see `run`.
@@ -194,7 +194,7 @@ class Simulation:
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
         for agent in self.agents:
-            agent.sense(self.ticks, self.truths[agent.name], world, log)
+            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
         for ping, fate in self.network.poll(before, self.truths):
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
@@ -205,17 +205,17 @@ class Simulation:
             )
         for agent in self.agents:
             agent.receive(self.network.deliver(agent.name, time))
-            agent.navigate(self.ticks, time, log)
+            with_blame(agent, agent.navigate, self.ticks, time, log)
         for agent in self.agents:
-            demand = agent.act(time, world.latched(agent.name), log)
+            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
             if demand is not None:
-                self._tell_of_approach(agent)
+                self._report_approach(agent)
                 world.command(agent.name, agent.vehicle.actuation.allocate(demand))
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
 
     def progress(self) -> ProgressState:
-        """How far the run is."""
+        """Progress of the run."""
         phases = [(agent.name, agent.mission.phases[agent.mission.phase]) for agent in self.agents]
         text = phases[0][1] if len(phases) == 1 else ", ".join(f"{name} {phase}" for name, phase in phases)
         first = self.agents[0]
@@ -225,7 +225,7 @@ class Simulation:
         return ProgressState(self.time, self.scenario.duration, text, distance)
 
     def log_contacts(self) -> None:
-        """Writes down the contacts of every vehicle, and their impulse so far."""
+        """Logs the contacts of every vehicle, and their impulse so far."""
         for agent in self.agents:
             impulse, tick = 0.0, 1.0 / self.scenario.rates.physics
             for contact in self.world.contacts(agent.name):
@@ -244,8 +244,8 @@ class Simulation:
         for name, truth in self.truths.items():
             self.log.truth(name, truth)
 
-    def _tell_of_approach(self, agent: Agent) -> None:
-        """Tells currents that turn in approaches how far the first vehicle is on its approach to a dock."""
+    def _report_approach(self, agent: Agent) -> None:
+        """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
         if not self._listeners or agent.mission is None:
             return
         attempt, dock = agent.approach, agent.mission.dock
@@ -281,7 +281,7 @@ class Simulation:
         return Recorder(groups, attributes, of_groups, path)
 
     def _attributes_of(self, agent: Agent) -> dict[str, Any]:
-        """What the log says of a vehicle as a whole."""
+        """Attributes of a vehicle in the log."""
         settings = self.scenario.vehicles[agent.name]
         return {
             "model": settings.model,
@@ -296,7 +296,7 @@ class Simulation:
         }
 
     def _attributes_of_structure(self, name: str) -> dict[str, Any]:
-        """What the log says of a structure; its transceiver is that of the first vehicle which it serves."""
+        """Attributes of a structure in the log; its transceiver is that of the first vehicle that it serves."""
         settings = self.scenario.structures[name]
         place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
         served = next((agent.name for agent in self.agents if agent.dock == name), None)
@@ -325,6 +325,18 @@ class Unrecorded:
 
     def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
         """Keeps nothing."""
+
+
+def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
+    """One turn of an agent; what a part of a user's own raises in it names that part.
+
+    Raises:
+        PartError: a part of a user's own raised something.
+    """
+    try:
+        return turn(*arguments)
+    except (Exception, SystemExit) as error:
+        raise agent.blame(error) from error.__cause__
 
 
 def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:

@@ -14,7 +14,7 @@ from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Innovation:
-    """What a measurement said that the belief did not."""
+    """Innovation of a measurement, with its covariance and gain."""
 
     residual: Array  # (m,)
     covariance: Array  # (m, m) of the residual, S = H P H' + R
@@ -26,22 +26,11 @@ class Innovation:
 def predict(belief: Gaussian, process: ProcessModel, u: Sequence[float], dt: float) -> Gaussian:
     """The belief after `dt` [s] with the input `u` held: f(x), F P F' + Q.
 
-    A process with a `propagate(mean, covariance, u, dt) -> (mean, covariance, ...)` of its own is predicted with that.
-
     Raises:
         NotFiniteError: The prediction is not finite.
     """
-    propagate = getattr(process, "propagate", None)
-    if propagate is not None:
-        mean, covariance, *_ = propagate(belief.mean, belief.covariance, u, dt)
-        return Gaussian(mean=mean, covariance=covariance)
-    x = belief.mean
-    F = process.jacobian(x, u, dt)
-    P = F @ belief.covariance @ F.T + process.covariance(x, u, dt)
-    mean = process.evaluate(x, u, dt)
-    if not (np.isfinite(mean).all() and np.isfinite(P).all()):
-        raise NotFiniteError(f"prediction over {dt:g} s from {x} with input {u} is not finite")
-    return Gaussian(mean=mean, covariance=0.5 * (P + P.T))
+    mean, covariance, _ = process.propagate(belief.mean, belief.covariance, u, dt)
+    return Gaussian(mean=mean, covariance=covariance)
 
 
 def correct(
@@ -52,7 +41,7 @@ def correct(
     Args:
         belief: State before the measurement.
         measurement: Value (m,) and covariance (m, m).
-        model: What the sensor shows of the state.
+        model: Measurement model of the sensor.
         gate: Probability with which a measurement that fits the models is accepted, 0.999 say; None accepts all.
 
     Raises:
@@ -60,9 +49,32 @@ def correct(
         NotFiniteError: The correction is not finite.
     """
     x = belief.mean
-    residual = model.residual(measurement.value, model.evaluate(x))
+    expected, H = model.shown(x, measurement)
+    residual = model.residual(measurement.value, expected)
     limit = math.inf if gate is None else chi_square(gate, residual.size)
-    return correct_linear(belief, model.jacobian(x), residual, model.covariance(x, measurement), limit)
+    return correct_linear(belief, H, residual, model.covariance(x, measurement), limit)
+
+
+def correct_iterated(
+    belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None, iterations: int = 5
+) -> tuple[Gaussian, Innovation]:
+    """As `correct`, linearised anew at each result (Gauss-Newton): for ranges as short as their beacon is uncertain.
+
+    The gate judges the first innovation. The last step's derivative makes the covariance (Bell and Cathey 1993).
+    """
+    x = belief.mean
+    result, first = correct(belief, measurement, model, gate)
+    if not first.accepted or model.is_linear:
+        return result, first
+    for _ in range(iterations - 1):
+        before = result.mean
+        expected, H = model.shown(before, measurement)
+        residual = model.residual(measurement.value, expected) - H @ (x - before)
+        result, _ = correct_linear(belief, H, residual, model.covariance(before, measurement))
+        step = result.mean - before
+        if float(step @ step) < 1e-12 * max(1.0, float(before @ before)):
+            break
+    return result, first
 
 
 def correct_linear(
@@ -78,6 +90,15 @@ def correct_linear(
         raise NotFiniteError(f"correction of {belief.mean} by the residual {residual} is not finite")
     innovation = Innovation(residual=residual, covariance=S, gain=gain, nis=nis, accepted=status == loops.OK)
     return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation
+
+
+def fuse(belief: Gaussian, measurement: Measurement, model: MeasurementModel) -> tuple[Gaussian, float]:
+    """The belief after a measurement without a gate, and its NIS: `correct` for those who need no more."""
+    if model.is_angle:
+        H, R = model.jacobian(belief.mean, measurement), model.covariance(belief.mean, measurement)
+        return correct_angle(belief, H, measurement.value, R)
+    corrected, innovation = correct(belief, measurement, model)
+    return corrected, innovation.nis
 
 
 def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> tuple[Gaussian, float]:

@@ -55,7 +55,7 @@ class Filter(Protocol[State]):
     """What a history replays. States are immutable and carry all that the next node needs."""
 
     def start(self, nodes: Sequence[Node[State]], index: int) -> State | None:
-        """First state, at a node with measurements; None if they do not suffice. Neighbours may be read only."""
+        """First state, at a node; None if its measurements do not suffice. Neighbours may be read only."""
         ...
 
     def predict(self, state: State, u: Input, duration: float) -> State:
@@ -104,7 +104,8 @@ class History(Generic[State]):
         self.outcomes: tuple[Outcome, ...] = ()
         self._decided: list[Outcome] = []
         self._reasons: dict[int, str] = {}  # last one reported of each measurement held, by its id
-        self._accepted: list[Measurement] = []
+        self._accepted: dict[tuple, float] = {}  # stamps of measurements taken, by stamp and by number
+        self._most_accepted = 256  # from then on those of long ago are forgotten
         self._touched = 0  # first node whose state is out of date
 
     @property
@@ -167,7 +168,7 @@ class History(Generic[State]):
             before = nodes[index - 1] if index else None
             try:
                 if before is None or before.state is None:
-                    node.state = filter.start(nodes, index) if node.measurements else None
+                    node.state = filter.start(nodes, index)
                 else:
                     state = filter.predict(before.state, before.input, node.time - before.time)
                     node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
@@ -210,7 +211,7 @@ class History(Generic[State]):
         self.reinitialised += not node.failed
         node.failed = True
         try:
-            node.state = self._filter.start(self.nodes, index) if node.measurements else None
+            node.state = self._filter.start(self.nodes, index)
         except (NotFiniteError, NotPositiveDefiniteError):
             node.state = None
 
@@ -227,6 +228,8 @@ class History(Generic[State]):
         after = len(nodes)
         while after and nodes[after - 1].time > stamp:
             after -= 1
+        if after and nodes[after - 1].time == stamp and nodes[after - 1].is_grid:  # the common case, cheaply
+            return after - 1
         # Only ticks attract: whether a node was inserted before or after must not matter.
         distance, index = min((abs(nodes[k].time - stamp), k) for k in self._neighbouring_ticks(after))
         if distance < self._snap:
@@ -268,12 +271,15 @@ class History(Generic[State]):
 
     def _is_duplicate(self, measurement: Measurement) -> bool:
         """Counts measurements that came before: same kind and source, and same sequence number or same stamp."""
-        oldest = self.nodes[-1].time - self._keep
-        self._accepted = [m for m in self._accepted if m.stamp >= oldest]
-        for known in self._accepted:
-            same_number = measurement.sequence is not None and known.sequence == measurement.sequence
-            alike = known.kind == measurement.kind and known.source == measurement.source
-            if alike and (same_number or known.stamp == measurement.stamp):
-                return not self.refuse("duplicate", measurement)
-        self._accepted.append(measurement)
+        oldest, known = self.nodes[-1].time - self._keep, self._accepted
+        source, number = (measurement.kind, measurement.source), measurement.sequence
+        by_stamp, by_number = (source, "stamp", measurement.stamp), (source, "number", number)
+        if by_stamp in known or (number is not None and known.get(by_number, -math.inf) >= oldest):
+            return not self.refuse("duplicate", measurement)
+        known[by_stamp] = measurement.stamp
+        if number is not None:
+            known[by_number] = measurement.stamp
+        if len(known) > self._most_accepted:
+            self._accepted = known = {key: stamp for key, stamp in known.items() if stamp >= oldest}
+            self._most_accepted = max(256, 2 * len(known))
         return False

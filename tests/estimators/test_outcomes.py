@@ -9,6 +9,7 @@ from docking_runs import TICK, simulate
 from test_augmented import shifted
 from test_history import compass, fix, history_until
 
+from estimators.core.history import History
 from estimators.docking.estimator import REFERENCE_NOISE, AugmentedFilter, DockingEstimator, InteractingFilter
 from estimators.planar.model import PRESTERO
 
@@ -113,3 +114,39 @@ def test_a_late_fix_that_undoes_a_recovery_gives_the_refusal_back():
         ends.add(tuple(sorted(last.items())))
     assert len(ends) == 1
     assert any(not accepted for _, (accepted, _) in next(iter(ends)))
+
+
+class Forgiving:
+    """Refuses each fix, and takes it back at the next node, unless that has a second measurement."""
+
+    def start(self, nodes, index):
+        return self.correct(((), ()), nodes[index].time, nodes[index].measurements)
+
+    def predict(self, state, u, duration):
+        return state[0], ()
+
+    def correct(self, state, node_time, measurements):
+        refused, _ = state
+        verdicts = [(m, "outlier", 9.0) for m in measurements]
+        if len(measurements) == 1:
+            verdicts += [(m, "", 9.0) for m in refused]
+        return tuple(measurements), tuple(verdicts)
+
+
+def test_what_a_later_node_revises_is_told_once_and_taken_back_once():
+    history = History(Forgiving(), step=0.5, verdicts=lambda state: state[1])
+    told = []
+    for k in range(3):
+        history.append(0.5 * k, (0.0,), [fix(0.5 * k)] if k else [])
+        history.replay()
+        told.append([(o.stamp, o.reason) for o in history.outcomes])
+    assert told == [[], [(0.5, "outlier")], [(0.5, ""), (1.0, "outlier")]]
+    history.insert(fix(0.01, kind="early"))  # all is replayed, and nothing of these changes
+    history.replay()
+    assert [(o.kind, o.stamp, o.reason) for o in history.outcomes] == [("early", 0.01, "")]
+    history.insert(fix(0.99, kind="late"))  # the node that took the fix back does so no more
+    history.replay()
+    assert {(o.kind, o.stamp, o.reason) for o in history.outcomes} == {
+        ("fix", 0.5, "outlier"),
+        ("late", 0.99, "outlier"),
+    }
