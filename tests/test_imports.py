@@ -52,8 +52,9 @@ def allowed(module: str, imported: str) -> bool:
         return (part not in ORDER and part in ("", "__version__", "CACHE_NOTE", "RENDERER_NOTE")) or (
             part in ORDER and ORDER.index(part) <= ORDER.index(name)
         )
-    # The package itself chooses the renderer and numba's cache. What else it offers it imports by name when it is first used, so that
-    # `import auvsim` stays fast and MuJoCo is imported after that choice. Run as a program, it is the command.
+    # The package itself chooses the renderer and numba's cache. What else it offers it imports by name when it is first
+    # used, so that `import auvsim` stays fast and MuJoCo is imported after that choice. Run as a program, it is the
+    # command.
     choices = ("auvsim.base.renderer.choose_renderer", "auvsim.base.compiled.choose_cache")
     return imported in (("auvsim.cli.main",) if name == "__main__" else choices)
 
