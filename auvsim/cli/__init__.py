@@ -1,5 +1,6 @@
 """The command `auvsim`."""
 
+import logging
 import math
 import os
 import sys
@@ -235,6 +236,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments == ["--version"]:
         print(f"auvsim {__version__}")
         return 0
+    logging.getLogger("absl").setLevel(logging.ERROR)  # MuJoCo's warnings; what comes of them is said in one line
     if CACHE_NOTE:
         print(f"auvsim: {CACHE_NOTE}", file=sys.stderr)
     with Interruption() as interruption:
