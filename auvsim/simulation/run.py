@@ -78,7 +78,9 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration))
+                    log.event(
+                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
+                    )
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
