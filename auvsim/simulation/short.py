@@ -122,7 +122,10 @@ def _full(short: ShortScenario) -> dict[str, Any]:
         "datum": short.datum,
         "physics": {"integrator": short.world.integrator},
         "water": {
-            "density": short.world.water_density, "sea_floor": short.world.sea_floor, "current": short.current
+            "density": short.world.water_density,
+            "sea_floor": short.world.sea_floor,
+            "terrain": short.world.terrain,
+            "current": short.current,
         },
         "network": {"acoustics": short.acoustics},
         "structures": {library.model_name("structure", short.dock.model): short.dock} if short.dock else {},

@@ -87,7 +87,10 @@ def test_divergence_is_diagnosed(
         (["--dock.model", "remus100"], "model remus100 lacks "),
         (["--estimator", "kalman"], "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm"),
         (["--estimator", "nowhere:factory"], "estimator 'nowhere:factory': ModuleNotFoundError"),
-        (["--vehicle.start.depth", "100"], "command line: vehicle.start.depth: 100 m is not between the surface and the"),
+        (
+            ["--vehicle.start.depth", "100"],
+            "command line: vehicle.start.depth: 100 m is not between the surface and the",
+        ),
     ],
 )
 def test_what_cannot_be_loaded_is_named(
