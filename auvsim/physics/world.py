@@ -45,6 +45,10 @@ class StructureState:
         """Name of the vehicle that its latch holds."""
         return next((name for name, latch in self._latches.items() if self._active[latch]), None)
 
+    def holds(self, vehicle: str) -> bool:
+        """Whether its latch holds a vehicle."""
+        return bool(self._active[self._latches[vehicle]])
+
     def hold(self, vehicle: str) -> None:
         """Closes the latch on a vehicle."""
         self._active[self._latches[vehicle]] = 1
@@ -129,7 +133,10 @@ class World:
 
     def latched(self, vehicle: str) -> str | None:
         """Name of the structure whose latch holds a vehicle."""
-        return next((name for name, state in self.structures.items() if state.latched == vehicle), None)
+        for name, state in self.structures.items():
+            if state.holds(vehicle):
+                return name
+        return None
 
     def reset(self) -> None:
         """Back to time zero: no contact, all latches open, and every vehicle waiting for its place."""

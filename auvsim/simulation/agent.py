@@ -138,6 +138,14 @@ class Agent:
         self._to_mission: list[Reading] = []  # since the last update of the mission
         self._end = math.inf
         self.over = False
+        self._running = self._controller  # the part whose code runs now, to blame for what it raises
+        self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
+        groups = ("estimate", "measurements", "mission", "command")
+        self._estimates, self._measurements, self._decisions, self._commands = (f"vehicles/{name}/{g}" for g in groups)
+
+    def blame(self, error: BaseException) -> BaseException:
+        """What to raise in place of an error from within this agent: a user's own part is named."""
+        return self._running.blamed(error)
 
     def groups(self, usbl: tuple[Table, Mapping[str, int]] | None) -> dict[str, Group]:
         """The groups of the vehicle in the log.
@@ -162,11 +170,11 @@ class Agent:
         for sensor, every, part in self.sensors:
             if ticks % every:
                 continue
-            with part:
-                reading = sensor.measure(truth, world)
-                if reading is not None:
-                    part.check(parts.reading, reading, sensor)
+            self._running = part
+            reading = sensor.measure(truth, world)
             if reading is not None:
+                if part.own:
+                    parts.reading(reading, sensor)
                 log.reading(self.name, reading)
                 self._readings.append(reading)
 
@@ -179,46 +187,49 @@ class Agent:
 
     def navigate(self, ticks: int, time: float, log: Log) -> None:
         """Hands all that arrived to the controller and, when it is due, to the estimator."""
-        with self._controller:
-            self.controller.observe(self._readings)
+        self._running = self._controller
+        self.controller.observe(self._readings)
         self._to_filter += self._readings
         self._to_mission += self._readings
         self._messages_to_filter += self._messages
         # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
-        with self._mission:
-            at_rest = self.mission.at_rest
-        if ticks % self._filter_ticks or at_rest:
+        self._running = self._mission
+        if ticks % self._filter_ticks or self.mission.at_rest:
             return
-        with self._estimator as part:
-            e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
-            part.check(parts.estimate, e, len(self.navigator.states))
+        self._running = self._estimator
+        e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+        if self._estimator.own:
+            parts.estimate(e, len(self.navigator.states))
         self._to_filter, self._messages_to_filter = [], []
         for kind, text in estimator_events(self.estimate, e):
             log.event(time, self.name, kind, text)
         self.estimate = e
         views = (e.position, e.heading, e.velocity, e.current)
-        log.append(self._path("estimate"), (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
+        log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
         for o in e.outcomes:
-            log.append(self._path("measurements"), (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
+            log.append(self._measurements, (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
 
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""
         mission, controller = self.mission, self.controller
-        with self._controller as part:
-            heading, depth = controller.heading, controller.depth
-            part.check(parts.smoothed, heading, depth)
+        self._running = self._controller
+        heading, depth = controller.heading, controller.depth
+        if self._controller.own:
+            parts.smoothed(heading, depth)
         if heading is None or depth is None:
             return None
         readings, self._to_mission = self._to_mission, []
-        with self._mission as part:
-            wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
-            part.check(parts.mission, mission, wanted)
-            row = mission.row()
-        with self._controller as part:
-            self.commands = controller.command(wanted)
-            part.check(parts.demand, self.commands, tuple(d.name for d in self.vehicle.actuation.demands))
-        log.append(self._path("mission"), (time, mission.phase, *wanted[:3], *row))
-        log.append(self._path("command"), (time, *self.commands))
+        self._running = self._mission
+        wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
+        if self._mission.own:
+            parts.mission(mission, wanted)
+        row = mission.row()
+        self._running = self._controller
+        self.commands = controller.command(wanted)
+        if self._controller.own:
+            parts.demand(self.commands, self._demands)
+        log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
+        log.append(self._commands, (time, *self.commands))
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
         mission.events.clear()
@@ -230,16 +241,13 @@ class Agent:
     @property
     def approach(self) -> int | None:
         """Number of the mission's approach under way, see `Mission`."""
-        with self._mission:
-            return self.mission.approach
+        self._running = self._mission
+        return self.mission.approach
 
     def overdue(self, duration: float) -> str:
         """What the log says when the time limit [s] of the run ends the mission."""
-        with self._mission:
-            return str(self.mission.overdue(duration))
-
-    def _path(self, group: str) -> str:
-        return f"vehicles/{self.name}/{group}"
+        self._running = self._mission
+        return str(self.mission.overdue(duration))
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:

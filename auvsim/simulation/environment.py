@@ -36,6 +36,10 @@ class CommandedAgent:
         self.name, self.vehicle = name, vehicle
         self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
 
+    def blame(self, error: BaseException) -> BaseException:
+        """The error itself."""
+        return error
+
     def sense(self, *_: Any) -> None:
         """Takes no readings."""
 

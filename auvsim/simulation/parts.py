@@ -2,8 +2,6 @@
 
 import math
 import traceback
-from collections.abc import Callable
-from types import TracebackType
 from typing import Any
 
 import numpy as np
@@ -31,7 +29,7 @@ class PartError(DivergenceError):
 
 
 class Part:
-    """Who is to blame for what is raised within it: `with part: ...`.
+    """A part of an agent, to be blamed for what it raises.
 
     What a shipped part raises passes as it is; of a user's own it becomes a PartError, which ends the run as diverged.
 
@@ -43,22 +41,15 @@ class Part:
 
     def __init__(self, what: str, kind: str, vehicle: str) -> None:
         self.name = f"{what} '{kind}' of '{vehicle}'"
-        self.own = plugins.is_own(kind)
+        self.own = plugins.is_own(kind)  # whether what it gives is to be checked
 
-    def __enter__(self) -> "Part":
-        return self
-
-    def __exit__(self, kind: Any, error: BaseException | None, trace: TracebackType | None) -> None:
+    def blamed(self, error: BaseException) -> BaseException:
+        """What to raise in place of an error that came out of this part."""
         if not self.own or not isinstance(error, Exception | SystemExit):
-            return
+            return error
         text = " ".join(str(error).split())[:300]
         lines = "".join(traceback.format_exception(error)).strip()
-        raise PartError(f"{self.name} failed: {type(error).__name__}: {text}", lines) from error
-
-    def check(self, rule: Callable[..., None], *values: Any) -> None:
-        """Sees that what a user's own part gave keeps a rule of its contract."""
-        if self.own:
-            rule(*values)
+        return PartError(f"{self.name} failed: {type(error).__name__}: {text}", lines)
 
 
 def reading(found: Any, sensor: Sensor) -> None:

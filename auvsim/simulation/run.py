@@ -79,7 +79,7 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", agent.overdue(scenario.duration))
+                    log.event(simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration))
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
@@ -197,7 +197,7 @@ class Simulation:
         time = world.time
         self._report_limits(time)
         for agent in self.agents:
-            agent.sense(self.ticks, self.truths[agent.name], world, log)
+            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
         for ping, fate in self.network.poll(before, self.truths):
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
@@ -208,9 +208,9 @@ class Simulation:
             )
         for agent in self.agents:
             agent.receive(self.network.deliver(agent.name, time))
-            agent.navigate(self.ticks, time, log)
+            with_blame(agent, agent.navigate, self.ticks, time, log)
         for agent in self.agents:
-            demand = agent.act(time, world.latched(agent.name), log)
+            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
             if demand is not None:
                 self._report_approach(agent)
                 world.command(agent.name, agent.vehicle.actuation.allocate(demand))
@@ -338,6 +338,18 @@ class Unrecorded:
 
     def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
         """Keeps nothing."""
+
+
+def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
+    """One turn of an agent; what a part of a user's own raises in it names that part.
+
+    Raises:
+        PartError: a part of a user's own raised something.
+    """
+    try:
+        return turn(*arguments)
+    except (Exception, SystemExit) as error:
+        raise agent.blame(error) from error.__cause__
 
 
 def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:

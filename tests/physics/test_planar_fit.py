@@ -125,7 +125,7 @@ def test_condensing_is_repeatable_and_scales_with_density():
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 25.0, float("nan")])
 def test_a_speed_that_is_none_is_refused(speed):
-    with pytest.raises(InputError, match=r"cannot condense 'remus100' at \S+ m/s"):
+    with pytest.raises(InputError, match=r"no planar model of 'remus100' at \S+ m/s"):
         fit_planar_model("remus100", speed)
 
 
