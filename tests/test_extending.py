@@ -12,6 +12,7 @@ import yaml
 from auvsim.analysis.summary import summarise
 from auvsim.base.errors import InputError
 from auvsim.base.frames import wrap
+from auvsim.cli import report
 from auvsim.data.log import VehicleLog, read, write
 from auvsim.simulation import scenario
 from auvsim.simulation.run import run
@@ -85,7 +86,9 @@ def test_controller_turns_to_the_heading_and_holds_it(profile: VehicleLog) -> No
     assert profile["command"]["rudder"][0] < 0.0  # to port
 
 
-def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(profile: VehicleLog) -> None:
+def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(
+    profile: VehicleLog, capsys: pytest.CaptureFixture[str]
+) -> None:
     """Phases, variables, events and metrics are all read off the log; it ends before the time limit."""
     mission, depth = profile["mission"], profile["truth"]["position"][:, 2]
     assert profile.phases == ("dive", "climb")
@@ -98,6 +101,10 @@ def test_mission_visits_its_depths_and_its_metrics_are_in_the_summary(profile: V
     summary = summarise(profile)
     assert summary["reached"] == 4
     assert summary["deepest"] == depth.max()
+    report.show(summary)
+    printed = capsys.readouterr().out
+    assert "Profile trial" in printed
+    assert re.search(rf"largest true depth \[m\] .* {depth.max():.3g} ", printed)
 
 
 @pytest.mark.parametrize(
@@ -124,3 +131,18 @@ def test_a_part_that_is_not_there_is_named(folder: Path) -> None:
     values["mission"]["kind"] = "mine.profile:Nothing"
     with pytest.raises(InputError, match=r"mission 'mine\.profile:Nothing': AttributeError"):
         run(scenario.parse(values))
+
+
+def test_a_part_that_raises_ends_the_run_as_diverged_with_its_traceback(folder: Path) -> None:
+    """The log up to there is kept, and names the part."""
+    (folder / "mine" / "broken.py").write_text(
+        BLOCKS["mine/reckoning.py"].replace("        c, s = np", "        assert time < 5.0\n        c, s = np")
+    )
+    values = yaml.safe_load(BLOCKS["profile.yaml"])
+    values["estimator"]["kind"] = "mine.broken:DeadReckoning"
+    log = run(scenario.parse(values))
+    event = log.groups["event"]
+    assert log.attributes["status"] == "diverged"
+    assert 4.0 < log.vehicle()["truth"]["time"][-1] <= 5.0
+    assert any("mine.broken:DeadReckoning" in text for text in event["text"][event["kind"] == "diverged"])
+    assert any("assert time < 5.0" in text for text in event["text"][event["kind"] == "traceback"])

@@ -29,8 +29,8 @@ Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$"
 class DatumSettings(Settings):
     """Place of the origin of NED on the earth; needed only where latitudes and longitudes are used."""
 
-    latitude: float | None = Field(default=None, ge=-90, le=90, description="of the origin, WGS84 [deg]")
-    longitude: float | None = Field(default=None, ge=-180, le=180, description="likewise [deg]")
+    latitude: float | None = Field(default=None, ge=-90, le=90, description="latitude of the origin, WGS84 [deg]")
+    longitude: float | None = Field(default=None, ge=-180, le=180, description="longitude of the origin, WGS84 [deg]")
 
     @model_validator(mode="after")
     def _whole(self) -> "DatumSettings":
@@ -88,7 +88,7 @@ class StructureSettings(Settings):
 
     model: str = Field(default="dock", description="a folder in models/, or the path of an .xml file")
     north: float = Field(default=0.0, description="north of the datum, centre of the mouth [m]")
-    east: float = Field(default=0.0, description="likewise [m]")
+    east: float = Field(default=0.0, description="east of the datum, centre of the mouth [m]")
     depth: float = Field(default=20.0, gt=0.0, description="depth of the centre of the mouth [m]")
     heading_deg: float = Field(
         default=0.0, description="course of a vehicle that enters along the axis, clockwise from north [deg]"
