@@ -19,6 +19,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, euler_to_quaternion, flip, flip_quaternion
 from auvsim.base.settings import Settings
 from auvsim.physics import hydrodynamics, scenery, soundness
+from auvsim.physics.ballast import BallastSettings, load, shift_buoyancy
 from auvsim.physics.fluid import WATER
 from auvsim.physics.forces import RECORD
 from auvsim.physics.truth import StructurePose
@@ -26,6 +27,7 @@ from auvsim.vehicles import library
 from auvsim.water.terrain import FlatSettings, Terrain, TerrainSettings, build_terrain
 
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+GRAVITY = 9.81  # [m/s2], MuJoCo's default
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
@@ -65,6 +67,7 @@ def scene(
     structures: Mapping[str, tuple[str, StructurePose]],
     settings: WorldSettings,
     rate: float,
+    ballast: Mapping[str, BallastSettings] | None = None,
 ) -> Scene:
     """Scene of vehicles and structures, as `compose` makes it.
 
@@ -76,6 +79,7 @@ def scene(
         structures: model and pose of each structure, by instance name; models as `library.structure` takes them.
         settings: of what surrounds them.
         rate: physics steps per second [Hz].
+        ballast: of vehicles that are not as their models have them, by instance name.
 
     Raises:
         InputError: a name or model cannot be used, or MuJoCo refuses the scene.
@@ -101,12 +105,23 @@ def scene(
         ends = _pillar(composed.structures[name], pose, terrain)
         if ends is not None:
             spec.geom(_pillar_name(name)).fromto = ends
+    loads = {name: of for name, of in (ballast or {}).items() if not of.is_zero}
+    for name, of in loads.items():
+        shift_buoyancy(spec, name, of, _buoyancy(composed.vehicles[name], settings.water_density))
     try:
         model = spec.compile()
     except ValueError as error:
         raise _refused(error) from None
+    for name, of in loads.items():
+        load(model, name, of)
     scenery.shape_sea_floor(model, terrain)
     return Scene(model, composed.vehicles, composed.structures, poses, terrain)
+
+
+def _buoyancy(vehicle: library.Vehicle, density: float) -> float:
+    """Buoyancy of a vehicle under water [N]."""
+    volume = vehicle.root.find("numeric", "hull_displaced_volume")
+    return GRAVITY * density * float(np.ravel(volume.data)[0])
 
 
 class _Composed(NamedTuple):

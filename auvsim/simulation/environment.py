@@ -66,6 +66,8 @@ class Docking(control.Task):
         self._plan, self._seed, self._episode = plan, seed, 0
         self._name, settings = plan.lone
         self._dock_name = plan.dock_of(self._name)
+        if not settings.ballast.is_zero:
+            raise InputError("vehicle.ballast: the environment has vehicles as their models have them; leave it out")
         if self._dock_name is None:
             raise InputError("the scenario has no dock; the environment is that of a docking")
         dock = plan.structures[self._dock_name]

@@ -79,7 +79,9 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration))
+                    log.event(
+                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
+                    )
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
@@ -382,6 +384,7 @@ def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> Worl
         {name: (settings.model, settings.pose) for name, settings in scenario.structures.items()},
         scenario.world,
         scenario.rates.physics,
+        {name: settings.ballast for name, settings in scenario.vehicles.items()},
     )
     return World(scene, current, scenario.water.density, **given)
 

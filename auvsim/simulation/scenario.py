@@ -16,6 +16,7 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
@@ -77,6 +78,7 @@ class VehicleSettings(Settings):
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    ballast: BallastSettings = BallastSettings()
     sensors: SensorSettings = SensorSettings()
     estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
