@@ -26,6 +26,7 @@ from auvsim.simulation import parts
 from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.simulation.stretches import Stretches
 from auvsim.vehicles.library import Vehicle
 
 
@@ -137,6 +138,7 @@ class Agent:
         self._messages_to_filter: list[Delivery] = []
         self._to_mission: list[Reading] = []  # since the last update of the mission
         self._end = math.inf
+        self._stretches = Stretches()
         self.over = False
         self._running = self._controller  # the part whose code runs now, to blame for what it raises
         self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
@@ -230,6 +232,7 @@ class Agent:
             parts.demand(self.commands, self._demands)
         log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
         log.append(self._commands, (time, *self.commands))
+        self._warn(time, log)
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
         mission.events.clear()
@@ -237,6 +240,12 @@ class Agent:
             self._end = time + mission.aftermath
         self.over = time >= self._end
         return self.commands
+
+    def _warn(self, time: float, log: Log) -> None:
+        """Logs the controller's warning where one begins; a controller of the user's own may have none."""
+        warning = getattr(self.controller, "warning", None)
+        if self._stretches.begins(time, "authority", holds=warning is not None):
+            log.event(time, self.name, "authority", str(warning))
 
     @property
     def approach(self) -> int | None:

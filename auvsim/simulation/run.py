@@ -29,6 +29,7 @@ from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
 from auvsim.simulation.parts import PartError
 from auvsim.simulation.scenario import Scenario, to_yaml
+from auvsim.simulation.stretches import Stretches
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField, build_current, listeners
 
@@ -150,6 +151,7 @@ class Simulation:
         self._log_ticks = max(1, round(rates.control / rates.log))
         self.progress_ticks = round(6.0 * rates.control)
         self._listeners = listeners(self.world.current)
+        self._stretches = Stretches()
         self.ticks = 0
         self.truths: dict[str, Truth] = {}
         for name, settings in scenario.vehicles.items():
@@ -195,6 +197,7 @@ class Simulation:
         self.ticks += 1
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
+        self._report_limits(time)
         for agent in self.agents:
             with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
         for ping, fate in self.network.poll(before, self.truths):
@@ -215,6 +218,16 @@ class Simulation:
                 world.command(agent.name, agent.vehicle.actuation.allocate(demand))
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
+
+    def _report_limits(self, time: float) -> None:
+        """Logs vehicles that come out of the water or touch the sea floor."""
+        world, before = self.world, time - 1.0 / self.scenario.rates.control
+        for agent in self.agents:
+            name, depth = agent.name, float(self.truths[agent.name].position[2])
+            if self._stretches.begins(time, name, "surfaced", holds=world.surfaced(name)):
+                self.log.event(time, name, "surfaced", f"part of the hull is out of the water, depth {depth:.2f} m")
+            if self._stretches.begins(time, name, "grounded", holds=world.grounded(name, before)):
+                self.log.event(time, name, "grounded", f"touches the sea floor, depth {depth:.2f} m")
 
     def progress(self) -> ProgressState:
         """Progress of the run."""
@@ -371,6 +384,7 @@ def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> Worl
         {name: (settings.model, settings.pose) for name, settings in scenario.structures.items()},
         scenario.world,
         scenario.rates.physics,
+        {name: settings.ballast for name, settings in scenario.vehicles.items()},
     )
     return World(scene, current, scenario.water.density, **given)
 

@@ -16,11 +16,13 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
+from auvsim.water.terrain import FlatSettings, TerrainSettings
 
 Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
 
@@ -76,6 +78,7 @@ class VehicleSettings(Settings):
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    ballast: BallastSettings = BallastSettings()
     sensors: SensorSettings = SensorSettings()
     estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
@@ -106,6 +109,7 @@ class WaterSettings(Settings):
         default=WorldSettings().water_density, ge=900.0, le=1300.0, description="density of the water [kg/m3]"
     )
     sea_floor: float = Field(default=40.0, gt=0, le=12_000.0, description="depth of the sea floor [m]")
+    terrain: TerrainSettings = Field(default=FlatSettings(), description="Shape of the sea floor, by its `kind`.")
     current: CurrentSettings = Field(
         default=UniformSettings(speed=0.0), description="The water's velocity, by its `kind`."
     )
@@ -163,10 +167,13 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _all_in_the_water(self) -> "Scenario":
-        floor = self.water.sea_floor
-        depths = [(f"structures.{name}.depth", structure.depth) for name, structure in self.structures.items()]
-        depths += [(f"vehicles.{name}.start.depth", vehicle.start.depth) for name, vehicle in self.vehicles.items()]
-        for key, depth in depths:
+        if self.water.terrain.kind == "grid":
+            return self  # the world sees to it, which reads the file
+        terrain = self.world.floor
+        places = [(f"structures.{name}.depth", s.pose.position.tolist()) for name, s in self.structures.items()]
+        places += [(f"vehicles.{name}.start.depth", self.start_position(name)) for name in self.vehicles]
+        for key, (north, east, depth) in places:
+            floor = terrain.depth(north, east)
             if not 0.0 < depth < floor:
                 raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
         return self
@@ -189,6 +196,7 @@ class Scenario(Settings):
             integrator=self.physics.integrator,
             water_density=self.water.density,
             sea_floor=self.water.sea_floor,
+            terrain=self.water.terrain,
         )
 
     def dock_of(self, vehicle: str, structure: str | None = None) -> str | None:

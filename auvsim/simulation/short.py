@@ -19,6 +19,7 @@ from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import WorldSettings
 from auvsim.simulation.scenario import DatumSettings, Rates, Scenario, Start, StructureSettings, validated
 from auvsim.simulation.sensor_settings import SensorSettings
@@ -27,10 +28,11 @@ from auvsim.water.settings import CurrentSettings, UniformSettings
 
 
 class LoneVehicle(Settings):
-    """The vehicle and its start."""
+    """The vehicle, its start and its ballast."""
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    ballast: BallastSettings = BallastSettings()
 
 
 class ShortScenario(Settings):
@@ -123,7 +125,10 @@ def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
         "datum": short.datum,
         "physics": {"integrator": short.world.integrator},
         "water": {
-            "density": short.world.water_density, "sea_floor": short.world.sea_floor, "current": short.current
+            "density": short.world.water_density,
+            "sea_floor": short.world.sea_floor,
+            "terrain": short.world.terrain,
+            "current": short.current,
         },
         "network": {"acoustics": short.acoustics},
         "structures": {dock: short.dock} if short.dock else {},
@@ -131,6 +136,7 @@ def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
             name: {
                 "model": short.vehicle.model,
                 "start": short.vehicle.start,
+                "ballast": short.vehicle.ballast,
                 "sensors": short.sensors,
                 "estimator": short.estimator,
                 "control": short.control,
@@ -150,7 +156,7 @@ def _model_name(kind: str, model: str, key: str, places: Mapping[str, str]) -> s
 
 def _short_key(path: str, short: ShortScenario) -> str:
     """The short form of a dotted key of the full form."""
-    path = re.sub(r"^vehicles\.[\w-]+\.(model|start)\b", r"vehicle.\1", path)
+    path = re.sub(r"^vehicles\.[\w-]+\.(model|start|ballast)\b", r"vehicle.\1", path)
     path = re.sub(r"^vehicles\.[\w-]+\.", "", path)
     path = re.sub(r"^structures\.[\w-]+\.", "dock.", path)
     if short.mission is None and path.startswith("mission."):
