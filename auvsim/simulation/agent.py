@@ -244,7 +244,7 @@ class Agent:
     def _warn(self, time: float, log: Log) -> None:
         """Logs the controller's warning where one begins; a controller of the user's own may have none."""
         warning = getattr(self.controller, "warning", None)
-        if self._stretches.begins(time, "authority", holds=warning is not None):
+        if warning is not None and self._stretches.begins(time, "authority"):
             log.event(time, self.name, "authority", str(warning))
 
     @property
@@ -255,8 +255,10 @@ class Agent:
 
     def overdue(self, duration: float) -> str:
         """What the log says when the time limit [s] of the run ends the mission."""
-        self._running = self._mission
-        return str(self.mission.overdue(duration))
+        try:
+            return str(self.mission.overdue(duration))
+        except Exception as error:
+            raise self._mission.blamed(error) from error.__cause__
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:
