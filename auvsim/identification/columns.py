@@ -67,6 +67,10 @@ QUANTITIES: dict[str, Quantity] = {
     "pitch": Quantity("angle", "pitch theta pitch_angle", "compass imu ahrs"),
     "current_north": Quantity("speed", "current_north current_n", "current"),
     "current_east": Quantity("speed", "current_east current_e", "current"),
+    "wind_forward": Quantity("speed", "wind_forward apparent_wind_forward", "wind anemometer"),
+    "wind_starboard": Quantity("speed", "wind_starboard apparent_wind_starboard", "wind anemometer"),
+    "wind_speed": Quantity("speed", "wind_speed apparent_wind_speed aws", "wind anemometer"),
+    "wind_from": Quantity("angle", "wind_from apparent_wind_angle awa", "wind anemometer"),
     "manoeuvre": Quantity("text", "manoeuvre maneuver manoeuver run segment test trial"),
 }
 _BY_ALIAS = {alias: name for name, quantity in QUANTITIES.items() for alias in quantity.aliases.split()}

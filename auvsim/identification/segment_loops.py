@@ -141,7 +141,7 @@ def rho(square, loss, threshold):
 
 
 @compiled
-def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals):
+def normal_equations(starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals):
     """Half the cost of a record's segments, their Gauss-Newton matrices and gradients, and the weighted residuals.
 
     Args:
@@ -175,7 +175,7 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
             for c in range(8):
                 here[c] = weights[c] != 0.0 and not math.isnan(measured[n, c])
             observe(x, S, (n - bounds[s]) * h, nuisance, k, here, y, J)
-            rows, part = take(
+            rows, part = add_sample(
                 measured[n], y, J, weights, here, loss, threshold, residuals[n], R, scaled, rows, H[s], g[s]
             )
             cost += part
@@ -185,12 +185,12 @@ def fold(starts, bounds, inputs, measured, weights, p, free, nuisance, h, subste
                 if not math.isfinite(x.sum()):
                     return math.inf, H, g
         R[rows:], scaled[rows:] = 0.0, 0.0
-        gather(H[s], g[s], R, scaled)
+        rank8_update(H[s], g[s], R, scaled)
     return (cost if math.isfinite(H.sum()) else math.inf), H, g
 
 
 @compiled
-def take(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, rows, H, g):
+def add_sample(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, rows, H, g):
     """Adds what is `here` of a sample to the weighted rows R (8, w), and these to H and g whenever they are full.
 
     Returns:
@@ -210,13 +210,13 @@ def take(measured, y, J, weights, here, loss, threshold, residuals, R, scaled, r
                 R[rows, j] = root * weights[c] * J[c, j]
             rows += 1
             if rows == 8:
-                gather(H, g, R, scaled)
+                rank8_update(H, g, R, scaled)
                 rows = 0
     return rows, cost
 
 
 @compiled
-def gather(H, g, R, e):
+def rank8_update(H, g, R, e):
     """Adds R' R (upper triangle) and R' e of eight weighted rows; all eight at once: to load H is what costs time."""
     r0, r1, r2, r3, r4, r5, r6, r7 = R[0], R[1], R[2], R[3], R[4], R[5], R[6], R[7]
     for i in range(g.size):

@@ -152,6 +152,7 @@ def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, 
         ends = np.array([piece.start, 0.5 * (piece.start + piece.stop), piece.stop])
         found[quantity] = Signal(times=ends, values=np.full(3, value))
     _combine(found)
+    _wind(found)
     lacking = [quantity for quantity in ("rudder", "shaft_speed") if quantity not in found]
     if lacking:
         return None, [*notes, f"{label}: left out: no {' and no '.join(lacking)} in it"]
@@ -208,6 +209,18 @@ def _combine(found: dict[str, Signal]) -> None:
         found["north"] = Signal(times=lat.times, values=reach * (lat.values - lat.values[0]))
         narrowing = math.cos(math.radians(float(lat.values[0])))
         found["east"] = Signal(times=lat.times, values=reach * narrowing * across)
+
+
+def _wind(found: dict[str, Signal]) -> None:
+    """Turns speed and direction of the apparent wind, as an anemometer gives them, into its two components."""
+    if {"wind_speed", "wind_from"} <= found.keys():
+        speed, angle = found["wind_speed"], found["wind_from"]
+        turn = np.interp(speed.times, angle.times, np.unwrap(angle.values))
+        found["wind_forward"] = Signal(times=speed.times, values=-speed.values * np.cos(turn))
+        found["wind_starboard"] = Signal(times=speed.times, values=-speed.values * np.sin(turn))
+    if not {"wind_forward", "wind_starboard"} <= found.keys():
+        found.pop("wind_forward", None)
+        found.pop("wind_starboard", None)
 
 
 def _current(found: Mapping[str, Signal]) -> Array | None:
