@@ -16,7 +16,7 @@ from auvsim.identification.pipeline import NAMES, Identification
 from auvsim.physics.planar_sets import UNITS
 
 DPI = 100
-_STYLE = """
+STYLE = """
 body { font: 15px/1.45 system-ui, sans-serif; color: #222; max-width: 1150px; margin: 2em auto; padding: 0 1em; }
 h1 { font-size: 1.5em; margin-bottom: .2em; } h2 { font-size: 1.15em; margin: 1.6em 0 .5em; }
 table { border-collapse: collapse; font-variant-numeric: tabular-nums; }
@@ -64,7 +64,7 @@ def html(found: Identification) -> str:
     return "\n".join(
         (
             f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(found.vehicle)}: planar model'
-            f"</title><style>{_STYLE}</style></head><body>",
+            f"</title><style>{STYLE}</style></head><body>",
             f"<h1>Planar model of {escape(found.vehicle)}</h1>",
             f'<p class="small">{_origin(found)}</p>',
             f'<ul class="verdicts">{"".join(_verdicts(found))}</ul>',

@@ -40,8 +40,15 @@ class _Table(NamedTuple):
     time: Array  # of the rows [s]
 
 
-def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Signals], list[str]]:
+def signals(
+    path: Path, mapping: Mapping[str, ColumnSettings], *, shaft: bool = True
+) -> tuple[list[Signals], list[str]]:
     """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
+
+    Args:
+        path: CSV or NetCDF.
+        mapping: What columns mean, where their names do not say it.
+        shaft: Whether the shaft speed must be there; else its thrust counts as constant.
 
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
@@ -55,12 +62,16 @@ def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Sig
         for name, s in mapping.items()
         if s.constant is not None
     }
+    if not shaft and "shaft_speed" not in by_quantity:
+        constants.setdefault("shaft_speed", 0.0)
     _require(path, by_quantity.keys() | constants.keys(), list(columns))
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
     time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
     table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time))
     notes = list(_assumptions(table, unknown))
+    if "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
+        notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
     found = []
     pieces = list(_pieces(table))
     for number, piece in enumerate(pieces, start=1):

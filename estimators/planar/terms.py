@@ -91,6 +91,10 @@ TERMS = tuple(
     for name, value in terms.items()
 )  # fmt: skip
 LABELS = tuple(term.label for term in TERMS)
+# Largest surge, sway and yaw rate [m/s, rad/s] that the terms are known for; they stand behind the coefficients.
+LIMITS = ("surge limit", "sway limit", "yaw rate limit")
+PARAMETERS = (*LABELS, *LIMITS)
+RETURN = 1.0  # time constant with which a velocity beyond its limit comes back [s]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -145,9 +149,18 @@ WIND = ("surge wind", "sway wind", "yaw wind", "yaw wind ab")
 
 
 def accelerations(nu: ca.SX, inputs: ca.SX, coefficients: ca.SX) -> ca.SX:
-    """Accelerations (3,) of nu = [u, v, r] under inputs (4,) [m/s^2, rad/s^2]; `coefficients` in the order of TERMS."""
-    motion = _Motion(*(nu[k] for k in range(3)), *(inputs[k] for k in range(INPUTS)))
-    sums = [ca.SX(0) for _ in AXES]
+    """Accelerations (3,) of nu = [u, v, r] under inputs (4,) [m/s^2, rad/s^2].
+
+    Beyond its limit a velocity counts as the limit, and comes back: sums of quadratic and cubic terms that were fitted
+    to smaller velocities may drive the vehicle there, which no water does.
+
+    Args:
+        nu, inputs: Velocities through the water, and the inputs.
+        coefficients: In the order of PARAMETERS; infinite limits are none.
+    """
+    known = [ca.fmax(ca.fmin(nu[k], coefficients[len(TERMS) + k]), -coefficients[len(TERMS) + k]) for k in range(3)]
+    motion = _Motion(*known, *(inputs[k] for k in range(INPUTS)))
+    sums = [(known[k] - nu[k]) / RETURN for k in range(3)]
     for place, term in enumerate(TERMS):
         sums[term.axis] += coefficients[place] * term.value(motion)
     return ca.vertcat(*sums)
@@ -156,7 +169,7 @@ def accelerations(nu: ca.SX, inputs: ca.SX, coefficients: ca.SX) -> ca.SX:
 @lru_cache
 def step_function() -> ca.Function:
     """One step (x, u, p, h) -> (x', F = dx'/dx) of the planar model's eight states, by the midpoint rule."""
-    x, u, p, h = ca.SX.sym("x", 8), ca.SX.sym("u", INPUTS), ca.SX.sym("p", len(TERMS)), ca.SX.sym("h")
+    x, u, p, h = ca.SX.sym("x", 8), ca.SX.sym("u", INPUTS), ca.SX.sym("p", len(PARAMETERS)), ca.SX.sym("h")
 
     def slope(x: ca.SX) -> ca.SX:
         cosine, sine = ca.cos(x[2]), ca.sin(x[2])
@@ -210,7 +223,7 @@ class TermsProcess:
     """A structure's motion as a ProcessModel.
 
     Args:
-        coefficients: By LABELS; what is left out is zero.
+        coefficients: By PARAMETERS; a term that is left out is zero, a limit none.
         noise: Power spectral densities (8,) of the process noise.
         max_substep: Longest substep [s].
 
@@ -273,17 +286,17 @@ class TermsProcess:
 
 
 def vector(coefficients: dict[str, float]) -> Array:
-    """Coefficients (terms,) in the order of TERMS; those left out are zero.
+    """Values (parameters,) in the order of PARAMETERS; terms left out are zero, limits left out infinite.
 
     Raises:
         ParameterError: There is no such term, or a coefficient is not finite.
     """
-    values = np.zeros(len(TERMS))
+    values = np.concatenate([np.zeros(len(TERMS)), np.full(len(LIMITS), np.inf)])
     for label, value in coefficients.items():
-        if label not in LABELS:
-            raise ParameterError(f"no term '{label}'; there are {', '.join(LABELS)}")
-        values[LABELS.index(label)] = value
-    if not np.isfinite(values).all():
+        if label not in PARAMETERS:
+            raise ParameterError(f"no term '{label}'; there are {', '.join(PARAMETERS)}")
+        values[PARAMETERS.index(label)] = value
+    if not np.isfinite(values[: len(TERMS)]).all() or not (values[len(TERMS) :] > 0.0).all():
         raise ParameterError(f"coefficients must be finite: {coefficients}")
     return values
 
@@ -301,9 +314,9 @@ def planar_parameters(coefficients: dict[str, float], masses: PlanarParameters |
         masses: Its masses and added masses are taken over; None: unit mass and moment of inertia.
 
     Raises:
-        ParameterError: A term is none of the planar model's, or the shaft's constant loss has no place there.
+        ParameterError: A term is none of the planar model's.
     """
-    foreign = [label for label, value in coefficients.items() if value and label not in PLANAR]
+    foreign = [label for label, value in coefficients.items() if value and label not in (*PLANAR, *LIMITS)]
     if foreign:
         raise ParameterError(f"the planar model has no term {', '.join(foreign)}")
     own = masses or PlanarParameters(m=1.0, I_z=1.0)

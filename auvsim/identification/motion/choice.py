@@ -61,9 +61,10 @@ class Choice:
     horizon: float  # [s]
     fit: MotionFit  # of the chosen one, to all of the data
     said: str  # how it was left out
+    folds: "Folds"
 
 
-class _Folds:
+class Folds:
     """Motions with each part left out in turn, and their fits, which are made once."""
 
     def __init__(self, motions: Sequence[Motion], horizon: float | None = None) -> None:
@@ -121,7 +122,7 @@ def choose(
         progress: Called with what is being done and the share that is done.
     """
     say = progress or (lambda text, share: None)
-    folds = _Folds(motions)
+    folds = Folds(motions)
     windy = any(np.any(motion.record.inputs[:, 2:]) for motion in motions)
     bases = [seen(folds.whole, with_terms(structure, WIND if windy else ())) for structure in structures]
     found: list[Candidate] = []
@@ -145,7 +146,7 @@ def choose(
     ranked = _ranked(found)
     chosen = simplest(ranked)
     return Choice(
-        candidates=tuple(ranked), chosen=chosen, horizon=folds.horizon, said=folds.said,
+        candidates=tuple(ranked), chosen=chosen, horizon=folds.horizon, said=folds.said, folds=folds,
         fit=folds.fit(chosen.structure, chosen.step, -1),
     )  # fmt: skip
 

@@ -12,20 +12,20 @@ from auvsim.identification.motion import rollout_loops
 from auvsim.identification.segment_problem import Equations
 from estimators.core.compiling import is_ready
 from estimators.core.kernels import python_source
-from estimators.planar.terms import INPUTS, LABELS, TERMS, accelerations
+from estimators.planar.terms import INPUTS, PARAMETERS, accelerations
 
 
 @lru_cache
 def loops() -> ModuleType:
     """The functions of `segment_loops` and `rollout_loops` on the terms, compiled at their first call."""
-    nu, u, p = ca.SX.sym("nu", 3), ca.SX.sym("u", INPUTS), ca.SX.sym("p", len(TERMS))
+    nu, u, p = ca.SX.sym("nu", 3), ca.SX.sym("u", INPUTS), ca.SX.sym("p", len(PARAMETERS))
     l = accelerations(nu, u, p)
     function = ca.Function("linearise", [nu, u, p], ca.cse([l, ca.jacobian(l, nu), ca.jacobian(l, p)]))
     source = python_source(function, "linearise", ("nu", "u", "p"), ("l", "A", "B"))
     return load_behind("terms_segments", source, segment_loops, rollout_loops)
 
 
-EQUATIONS = Equations(LABELS, loops, lambda p: bool(np.isfinite(p).all()))
+EQUATIONS = Equations(PARAMETERS, loops, lambda p: not np.isnan(p).any())
 
 
 def is_warm() -> bool:

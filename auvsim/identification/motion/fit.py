@@ -15,7 +15,7 @@ from auvsim.identification.motion import engine
 from auvsim.identification.motion.data import Motion, nuisances
 from auvsim.identification.segment_problem import Point, Problem, SegmentOptions, minimise
 from estimators.core.types import Array
-from estimators.planar.terms import LABELS, TERMS, Structure
+from estimators.planar.terms import LABELS, LIMITS, TERMS, Structure, vector
 
 STEPS = ("least squares", "segments of 20 s", "segments of 60 s", "output error")
 LENGTHS = {"segments of 20 s": 20.0, "segments of 60 s": 60.0}  # [s]; else whole records
@@ -28,6 +28,7 @@ START = np.array([0.3, 0.3, 0.02, 0.03, 0.03, 0.01])  # deviations of first stat
 THRESHOLD = 3.0  # of Huber's loss, in deviations: what a few stretches cannot explain does not decide
 FORGET = 0.2  # share of the last step's information that the next one, which sees the same data, keeps
 ROUNDS = 2  # of deviations from residuals
+BEYOND = 1.5  # limits of a model's velocities, by the largest in the data
 _TOLERANCE = 1e-3  # of half the sum of squares, by what it is worth
 
 
@@ -52,21 +53,20 @@ class MotionFit:
     blocks: tuple[tuple[Array, Array], ...]  # (k, k) and (k,): information and gradient of each stretch of the data
     deviations: Array  # (8,) of the channels, with what the model lacks
     currents: Array  # (records, 2) [m/s]
+    limits: Array  # (3,) of surge, sway and yaw rate [m/s, rad/s]
     converged: bool
     iterations: int
     worth: float = 1.0  # by what the information overstates the data, see ALIKE
 
     @property
     def vector(self) -> Array:
-        """All coefficients (terms,)."""
-        p = np.zeros(len(TERMS))
-        p[list(self.structure.places)] = self.values
-        return p
+        """All parameters (parameters,)."""
+        return vector(self.coefficients)
 
     @property
     def coefficients(self) -> dict[str, float]:
         """By their labels."""
-        return dict(zip(self.structure.terms, self.values.tolist(), strict=True))
+        return dict(zip((*self.structure.terms, *LIMITS), [*self.values.tolist(), *self.limits.tolist()], strict=True))
 
 
 class Regression(NamedTuple):
@@ -75,12 +75,13 @@ class Regression(NamedTuple):
     terms: Array  # (w, 3, all terms)
     changes: Array  # (w, 3)
     stretch: Array  # (w,) which block of the data an equation belongs to
+    limits: Array  # (3,) of the velocities, see BEYOND
 
 
 def regression(motions: Sequence[Motion], block: float = 60.0) -> Regression:
     """Changes of velocity over windows, and the integrals of all terms over them."""
     every = np.arange(len(LABELS))
-    zero = np.zeros(len(TERMS))
+    zero = vector({})
     terms, changes, stretch, number = [], [], [], 0
     for motion in motions:
         record = motion.record
@@ -99,7 +100,10 @@ def regression(motions: Sequence[Motion], block: float = 60.0) -> Regression:
         blocks = ((edges[:-1] * record.step) // block).astype(int)
         stretch.append(number + blocks)
         number += int(blocks[-1]) + 1
-    return Regression(np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch))
+    limits = BEYOND * np.max([np.abs(motion.states[:, 3:6]).max(axis=0) for motion in motions], axis=0)
+    return Regression(
+        np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch), np.maximum(limits, 1e-3)
+    )
 
 
 def reach(equations: Regression, structure: Structure) -> Array:
@@ -140,7 +144,8 @@ def least_squares(motions: Sequence[Motion], structure: Structure, equations: Re
     return MotionFit(
         structure=structure, step="least squares", values=values, information=information, blocks=tuple(blocks),
         deviations=np.array([motions[0].record.deviations[c] for c in range(8)]),
-        currents=np.array([motion.states[-1, 6:8] for motion in motions]), converged=True, iterations=1,
+        currents=np.array([motion.states[-1, 6:8] for motion in motions]), limits=found.limits,
+        converged=True, iterations=1,
     )  # fmt: skip
 
 
@@ -202,7 +207,7 @@ def segments(
     return MotionFit(
         structure=structure, step=step, values=values, information=_without_nuisances(total, k),
         blocks=tuple(_blocks(problem, point)), deviations=deviations, currents=point.nuisances[:, :2],
-        converged=converged, iterations=used, worth=worth,
+        limits=guess.limits, converged=converged, iterations=used, worth=worth,
     )  # fmt: skip
 
 

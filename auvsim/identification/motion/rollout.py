@@ -10,6 +10,7 @@ from auvsim.identification.motion import engine
 from auvsim.identification.motion.data import Motion
 from auvsim.identification.states import substeps
 from estimators.core.types import Array
+from estimators.planar.terms import vector
 
 HORIZONS = (10.0, 30.0, 60.0, 120.0)  # [s]
 EVERY = 10.0  # from one start to the next [s]
@@ -51,7 +52,7 @@ def horizons(motions: Sequence[Motion], wanted: Sequence[float] = HORIZONS) -> t
 
 
 def roll(
-    vector: Array,
+    parameters: Array,
     motion: Motion,
     wanted: Sequence[float],
     *,
@@ -62,7 +63,7 @@ def roll(
     """Predicts a motion from every few seconds of it, from the smoothed state there and the record's inputs alone.
 
     Args:
-        vector: Coefficients (terms,).
+        parameters: In the order of `terms.PARAMETERS`.
         motion: Which is predicted.
         wanted: Horizons [s]; those past the motion's end are left out, prediction by prediction, as NaN.
         sensitive: Places of the coefficients whose sensitivities are wanted.
@@ -87,7 +88,7 @@ def roll(
         first = motion.states[begin[here]]
         x, _, S, P = engine.loops().predict(
             np.ascontiguousarray(first[:, :6]), begin[here], marks[:number], np.ascontiguousarray(record.inputs),
-            vector, np.asarray(sensitive, dtype=np.int64), np.ascontiguousarray(first[:, 6:8]), step, substeps(step),
+            parameters, np.asarray(sensitive, dtype=np.int64), np.ascontiguousarray(first[:, 6:8]), step, substeps(step),
             spread,
         )  # fmt: skip
         states[here, :number], sensitivity[here, :number], covariance[here, :number] = x, S, P
@@ -98,6 +99,12 @@ def roll(
         begin=begin, horizons=tuple(wanted), states=states, measured=measured, distance=distance,
         sensitivity=sensitivity, covariance=covariance,
     )  # fmt: skip
+
+
+def persistence(motion: Motion, wanted: Sequence[float], every: float = EVERY) -> Rollouts:
+    """What `roll` would predict if each velocity stayed as it is: a model is worth nothing that does no better."""
+    still = vector({})
+    return roll(still, motion, wanted, every=every)
 
 
 def rms(shares: Sequence[Array]) -> Array:
