@@ -2,7 +2,7 @@
 
 The KVLCC2 at a length of 7 m by the MMG standard method (Yasukawa and Yoshimura, J. Mar. Sci. Technol. 20, 2015): hull
 forces with cubic terms, propeller by its open-water curve, rudder in the propeller's stream with other flow
-straightening to port than to starboard. Wind by constant coefficients, and a slow disturbance of each acceleration.
+straightening to port than to starboard. Its yaw damping is halved, so that it is clearly unstable on its course. Wind by constant coefficients, and a slow disturbance of each acceleration.
 Only NumPy. Yaw rate and heading clockwise, sway to starboard; a positive rudder turns to starboard.
 """
 
@@ -48,7 +48,7 @@ def slope(x: np.ndarray, rudder: float, shaft: float, wind: np.ndarray, push: np
     q = 0.5 * RHO * LENGTH * DRAUGHT * speed**2
     XH = q * (-0.022 * (u / speed) * abs(u / speed) - 0.040 * vp**2 + 0.002 * vp * rp + 0.011 * rp**2 + 0.771 * vp**4)
     YH = -0.315 * vp + 0.083 * rp - 1.607 * vp**3 + 0.379 * vp**2 * rp - 0.391 * vp * rp**2 + 0.008 * rp**3
-    NH = -0.137 * vp - 0.049 * rp - 0.030 * vp**3 - 0.294 * vp**2 * rp + 0.055 * vp * rp**2 - 0.013 * rp**3
+    NH = -0.137 * vp - 0.025 * rp - 0.030 * vp**3 - 0.294 * vp**2 * rp + 0.055 * vp * rp**2 - 0.013 * rp**3
     YH, NH = q * YH, q * LENGTH * NH
     n = max(shaft, 1e-3) / (2.0 * math.pi)
     drift = math.atan2(-v, max(u, 1e-3))

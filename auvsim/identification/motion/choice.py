@@ -16,12 +16,12 @@ from auvsim.identification.motion.data import Motion, slices
 from auvsim.identification.motion.fit import STEPS, MotionFit, Regression
 from auvsim.identification.motion.rollout import horizons, rms, roll
 from estimators.core.types import Array
-from estimators.planar.terms import ASYMMETRY, LABELS, STRUCTURES, TERMS, WIND, Structure
+from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS, WIND, Structure
 
 HORIZON = 60.0  # of the predictions that decide [s]
 FOLDS = 4
 KEPT = 2  # structures that go on to all steps
-EQUAL = 0.03  # a simpler model is no worse than this share of the best one's error
+EQUAL = 0.1  # a simpler model is no worse than the best one by more than this share of its error
 SHORTEST = 40.0  # of a part of a record that is left out [s]
 FIRST_STEPS = STEPS[:2]
 
@@ -130,6 +130,9 @@ def choose(
     for number, structure in enumerate(bases):
         say(f"cross-validation: {structure.name}", 0.5 * number / len(bases))
         found += [folds.candidate(structure, step) for step in first]
+    if windy:  # a docking filter knows no wind
+        calm = [seen(folds.whole, structure) for structure in structures if set(structure.terms) <= set(PLANAR)]
+        found += [folds.candidate(structure, FIRST_STEPS[0]) for structure in calm]
     best = _ranked(found)[0].structure
     more = [with_terms(best, ASYMMETRY)]
     if windy:

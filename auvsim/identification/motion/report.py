@@ -97,7 +97,7 @@ def _horizons(found: MotionIdentification) -> Iterator[str]:
     )  # fmt: skip
     yield (
         '<p class="small">Position error by the distance run, rms. Each prediction begins at the smoothed state and takes '
-        "the record's inputs alone; no bias is fitted. The band is the radius of the circle of its area.</p>"
+        "the record's inputs alone; no bias is fitted. The band is the longer semi-axis of its ellipse.</p>"
     )
     if found.steps:
         yield "<p>Each step of the chosen structure on what was held out:</p>"

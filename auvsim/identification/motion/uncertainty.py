@@ -22,6 +22,7 @@ from estimators.core.types import Array
 from estimators.planar.terms import LABELS, Structure
 
 PROBABILITY = 0.95
+BETWEEN = 0.5  # standard deviations among records by which bands are wider than on the mean of them
 CONSTANTS = tuple(LABELS.index(f"{axis} 1") for axis in ("surge", "sway", "yaw"))
 _SEEN = (0, 1, 2)  # of the state: position and heading say what the process does between sensors
 _SHORTEST = 20.0  # of a half of a record [s]
@@ -45,7 +46,7 @@ class Held:
     share: Array  # (m,) position error by the distance run, rms
     inside: Array  # (m,) share of the positions inside their band
     parameters_inside: Array  # (m,) the same of the band of the coefficients' covariance alone
-    radius: Array  # (m,) of the circle of the band's area by the distance run, median
+    radius: Array  # (m,) longer semi-axis of the band by the distance run, median
     count: Array  # (m,) predictions
 
 
@@ -106,8 +107,11 @@ def spread(left_out: Sequence[tuple[Rollouts, Array]]) -> Spread:
     best = minimize(cost, begin, method="L-BFGS-B", bounds=[(-40.0, 3.0)] * 6 + [(-12.0, 3.0)], options={"maxiter": 60})
     sizes = np.exp(best.x)
     draft = Spread(noise=sizes[:3], constant=np.sqrt(sizes[3:6]), first=float(sizes[6]), factor=1.0)
-    scores = np.concatenate([_scores(rollouts, covariance, draft) for rollouts, covariance in left_out])
-    factor = float(np.quantile(scores[np.isfinite(scores)], PROBABILITY)) / chi_square(PROBABILITY, 2)
+    scores = [_scores(rollouts, covariance, draft) for rollouts, covariance in left_out]
+    logs = np.array([math.log(float(np.quantile(s[np.isfinite(s)], PROBABILITY))) for s in scores if np.isfinite(s).any()])
+    # Records differ from each other by more than predictions of one record do, and the next one is another.
+    between = float(np.std(logs, ddof=1)) if len(logs) > 1 else 0.0
+    factor = math.exp(float(np.mean(logs)) + BETWEEN * between) / chi_square(PROBABILITY, 2)
     return replace(draft, factor=max(factor, 1e-3))
 
 
@@ -144,9 +148,10 @@ def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
     scores = np.concatenate([_scores(r, c, found) for r, c in left_out])
     plain = np.concatenate([_scores(r, c, alone) for r, c in left_out])
     shares = np.concatenate([r.shares for r, _ in left_out])
-    areas = np.concatenate(
+    lengths = np.concatenate(
         [
-            np.linalg.det(np.nan_to_num(position_covariance(r, c, found))) ** 0.25 / np.maximum(r.distance, 1e-6)
+            np.sqrt(np.linalg.eigvalsh(np.nan_to_num(position_covariance(r, c, found)))[..., -1])
+            / np.maximum(r.distance, 1e-6)
             for r, c in left_out
         ]
     )
@@ -158,7 +163,7 @@ def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
         share=np.sqrt(np.nansum(shares**2, axis=0) / some),
         inside=np.sum(scores <= limit, axis=0) / some,
         parameters_inside=np.sum(plain <= limit, axis=0) / some,
-        radius=math.sqrt(limit) * np.nanmedian(np.where(np.isfinite(shares), areas, np.nan), axis=0),
+        radius=math.sqrt(limit) * np.nanmedian(np.where(np.isfinite(shares), lengths, np.nan), axis=0),
         count=count,
     )
 
