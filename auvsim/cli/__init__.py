@@ -161,11 +161,11 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fits a model of motion to logs of manoeuvres, of the structure that predicts best, and judges it on what is held out.
+    """Fits the model of motion that predicts best to logs of manoeuvres, and judges it on what is held out.
 
-    Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model of
-    `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle) the
-    planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with named
+    Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model
+    of `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle)
+    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with named
     columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
     clockwise from north.
     """

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from auvsim.base.errors import InputError
+from auvsim.identification import velocity_checks
 from auvsim.identification.columns import Meaning
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signals
@@ -54,8 +55,8 @@ def heading_unit(times: Array, heading: Array, meaning: Meaning, path: Path) -> 
         raise InputError(f"{where} wraps after {wraps / DEGREE:.2f} deg: these are radians; name it `heading [rad]`")
 
 
-def signals(found: Sequence[Signals], rudder_limit: float = RUDDER, shaft_limit: float | None = None) -> None:
-    """Refuses signals that no manoeuvre of the vehicle can be.
+def signals(found: Sequence[Signals], rudder_limit: float = RUDDER, shaft_limit: float | None = None) -> list[str]:
+    """Refuses signals that no manoeuvre of the vehicle can be; notes on what is doubtful.
 
     Args:
         found: All that was read.
@@ -67,10 +68,13 @@ def signals(found: Sequence[Signals], rudder_limit: float = RUDDER, shaft_limit:
     """
     if not found:
         raise InputError("no manoeuvre was found; each needs rudder and shaft speed together for some minutes")
+    notes = []
     for one in found:
         _inputs(one, rudder_limit, shaft_limit)
         _heading_and_gyro(one)
         _speeds_and_positions(one)
+        notes += velocity_checks.check(one)
+    return notes
 
 
 def _inputs(one: Signals, rudder_limit: float, shaft_limit: float | None) -> None:

@@ -60,6 +60,8 @@ QUANTITIES: dict[str, Quantity] = {
     "sway": Quantity("speed", "sway v water_sway dvl_water_v v_water", "dvl log"),
     "ground_surge": Quantity("speed", "ground_surge dvl_u u_ground dvl_bottom_u bottom_surge", "dvl"),
     "ground_sway": Quantity("speed", "ground_sway dvl_v v_ground dvl_bottom_v bottom_sway", "dvl"),
+    "velocity_north": Quantity("speed", "velocity_north v_north vel_north vn", "gps dvl"),
+    "velocity_east": Quantity("speed", "velocity_east v_east vel_east ve", "gps dvl"),
     "north": Quantity("length", "north northing pos_north position_north", "position usbl gps"),
     "east": Quantity("length", "east easting pos_east position_east", "position usbl gps"),
     "latitude": Quantity("place", "latitude lat", "position gps"),

@@ -172,9 +172,9 @@ def _fits(
     steps: Sequence[str],
     say: Callable[[str, float], None],
 ) -> tuple[list[Fit], Sequence[Record], tuple[str, ...], list[Verdict]]:
-    """The fit of each step, each from the one before; records as segments weigh them; parameters whose start was believed.
+    """The fit of each step, each from the one before; and what segments found on the way.
 
-    Last come verdicts that say what that means.
+    That is the records as they are weighed, the parameters whose start was believed, and verdicts that say so.
     """
     weighed: Sequence[Record] = records
     fits: list[Fit] = []

@@ -21,8 +21,8 @@ def read(
 
     Args:
         paths: NetCDF logs of auvsim, or CSV and NetCDF files with named columns.
-        vehicle: Name in models/, or the path of an MJCF file; a trial log's must be the same. Its limits are known. None:
-            any; then a table may lack the shaft speed.
+        vehicle: Name in models/, or the path of an MJCF file; a trial log's must be the same. Its limits are known.
+            None: any; then a table may lack the shaft speed.
         columns: A mapping file for the users' tables.
         step: Of the records' grid [s]; each rudder's own if None.
 
@@ -35,10 +35,8 @@ def read(
     for path in paths:
         sources.append(Source(file=path.name, sha256=_hash(path)))
         ones, more = _signals(path, mapping, vehicle)
-        if limits is None:
-            checks.signals(ones)
-        else:
-            checks.signals(ones, limits.allocation.limit, limits.shaft_limit)
+        known = () if limits is None else (limits.allocation.limit, limits.shaft_limit)
+        more += checks.signals(ones, *known)
         notes += more
         for one in ones:
             records, more = signals.records(one, step)

@@ -141,7 +141,9 @@ def rho(square, loss, threshold):
 
 
 @compiled
-def normal_equations(starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals):
+def normal_equations(
+    starts, bounds, inputs, measured, weights, p, free, nuisance, h, substeps, loss, threshold, residuals
+):
     """Half the cost of a record's segments, their Gauss-Newton matrices and gradients, and the weighted residuals.
 
     Args:

@@ -70,9 +70,7 @@ def _lowest(problem: Problem, start: PlanarParameters, states: Sequence[Array]) 
     return point, iterations, converged
 
 
-def _other_starts(
-    problem: Problem, start: PlanarParameters, states: Sequence[Array]
-) -> Iterator[tuple[Array, int]]:
+def _other_starts(problem: Problem, start: PlanarParameters, states: Sequence[Array]) -> Iterator[tuple[Array, int]]:
     """Values (k,) of the free parameters from which to go down, and the iterations that they took."""
     options, records = problem.options, [cut.record for cut in problem.cuts]
     values = first_values(records, states, start, problem.free)

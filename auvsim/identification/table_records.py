@@ -213,6 +213,13 @@ def _combine(found: dict[str, Signal]) -> None:
     """Puts what goes by other names under those of a record."""
     if "rudder" not in found and "rudder_command" in found:
         found["rudder"] = found["rudder_command"]
+    if {"velocity_north", "velocity_east", "heading"} <= found.keys() and "ground_surge" not in found:
+        north, east, heading = (found[name] for name in ("velocity_north", "velocity_east", "heading"))
+        across = np.interp(north.times, east.times, east.values)
+        turn = np.exp(-1j * np.interp(north.times, heading.times, heading.values))
+        body = (north.values + 1j * across) * turn
+        found["ground_surge"] = Signal(times=north.times, values=body.real)
+        found["ground_sway"] = Signal(times=north.times, values=body.imag)
     if {"latitude", "longitude"} <= found.keys() and "north" not in found:
         lat, lon = found["latitude"], found["longitude"]
         reach = math.radians(1.0) * EARTH

@@ -89,7 +89,7 @@ def _slope(x, inputs, coefficients, terms):
 
 
 def output_error(runs: Sequence[Run], terms=planar, evaluations: int = 15) -> list[np.ndarray]:
-    """Coefficients by SciPy's least squares of free runs of 60 s against all that is logged, from those of `ordinary`."""
+    """Coefficients by SciPy's least squares of free runs of 60 s against the log, from those of `ordinary`."""
     start = ordinary(runs, terms)
     sizes = np.cumsum([len(own) for own in start])[:-1]
     scale = np.concatenate([np.maximum(np.abs(own), 1e-6) for own in start])

@@ -134,7 +134,8 @@ def test_lags_are_found_and_taken_out(runs: list[tanker.Run], paths: list[Path])
     off = [np.nanstd(values - truth) for values in (rate, record.measured[:, 5])]
     assert off[0] < 0.5 * off[1]
     prompt = [tanker.sail(kind, 6, SEA._replace(lag=0.0, filtered=0.0), 200.0) for kind in KINDS]
-    still = lags.find(read([tanker.write(p.parent / f"prompt_{p.name}", r.log) for p, r in zip(paths, prompt)]).records)
+    written = [tanker.write(paths[0].parent / f"prompt_{run.kind}.csv", run.log) for run in prompt]
+    still = lags.find(read(written).records)
     assert still.velocity == still.yaw_rate == 0.0
 
 
@@ -237,9 +238,7 @@ def test_sensitivities_and_noise_of_predictions() -> None:
         assert np.var(points[:, axis]) == pytest.approx(expected, rel=0.15)
 
 
-def test_the_choice_beats_planar_least_squares(
-    found: MotionIdentification, runs: list[tanker.Run]
-) -> None:
+def test_the_choice_beats_planar_least_squares(found: MotionIdentification, runs: list[tanker.Run]) -> None:
     """On what is held out: at most 0.7 of planar least squares, and 1.03 of the best of four baselines."""
     errors = {
         name: baselines.error(runs[3:], of(runs[:3], terms), terms)
@@ -280,9 +279,7 @@ def test_a_model_is_read_as_it_was_written(found: MotionIdentification, tmp_path
             files.read(tmp_path / "wrong.yaml")
 
 
-def test_the_command_starts_from_nothing(
-    paths: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A log without a shaft, no vehicle named: files a filter believes, a report that begins with trust, no REMUS."""
     logs = []
     for path in paths:

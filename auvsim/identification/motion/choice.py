@@ -8,6 +8,7 @@ steps.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -79,7 +80,9 @@ class Folds:
         """A fit without one part; of the whole with the fold -1."""
         key = structure.terms, step, fold
         if key not in self._fits:
-            motions, equations = (self.motions, self.whole) if fold < 0 else (self.splits[fold][0], self.equations[fold])
+            motions, equations = (
+                (self.motions, self.whole) if fold < 0 else (self.splits[fold][0], self.equations[fold])
+            )
             self._fits[key] = self._made(structure, step, fold, motions, equations)
         return self._fits[key]
 
@@ -223,9 +226,9 @@ def _splits(motions: Sequence[Motion]) -> tuple[list[tuple[list[Motion], list[Mo
         if parts == 1 and len(motions) == 1:
             parts = 2
         edges = np.linspace(0, count, parts + 1).astype(int)
-        for start, stop in zip(edges[:-1], edges[1:], strict=True):
+        for start, stop in pairwise(edges.tolist()):
             rest = [m for m in motions if m is not motion]
             rest += [slices(motion, a, b) for a, b in ((0, start), (stop, count)) if b - a > 20]
             if rest:
-                splits.append((rest, [slices(motion, int(start), int(stop))]))
+                splits.append((rest, [slices(motion, start, stop)]))
     return splits, f"{len(splits)} parts of records left out in turn"

@@ -5,6 +5,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
+import numpy as np
 from pydantic import Field, ValidationError, model_validator
 
 import auvsim
@@ -46,7 +47,9 @@ class MotionModel(Settings):
     structure: str
     method: str
     version: str = Field(description="of auvsim")
-    coefficients: dict[str, Value] = Field(description="by term; surge, sway [m/s2] and yaw [rad/s2] by the term's unit")
+    coefficients: dict[str, Value] = Field(
+        description="by term; surge, sway [m/s2] and yaw [rad/s2] by the term's unit"
+    )
     limits: dict[str, float] = Field(description="largest velocities the terms are known for [m/s, m/s, rad/s]")
     noise: dict[str, float] = Field(description="densities of the process noise [m2/s3, m2/s3, rad2/s3]")
     velocity_lag: float = Field(description="of the log's velocities behind its positions [s]")
@@ -95,9 +98,10 @@ def motion_model(found: MotionIdentification) -> MotionModel:
 
 
 def _noise(found: MotionIdentification) -> Array:
-    """Densities (3,) of white noise that spreads predictions of the horizon as the band's white and constant parts do."""
+    """Densities (3,) of white noise that spreads predictions as the band's white and constant parts do."""
     constant = found.spread.constant**2 * found.choice.horizon / 3.0  # of velocity after a third of it, on average
-    return found.spread.factor * (found.spread.noise + constant)
+    factor = float(np.interp(found.choice.horizon, found.spread.horizons, found.spread.factors))
+    return factor * (found.spread.noise + constant)
 
 
 def planar_set(found: MotionIdentification, masses: PlanarParameters | None = None) -> PlanarSet | None:

@@ -101,9 +101,7 @@ def regression(motions: Sequence[Motion], block: float = 60.0) -> Regression:
         stretch.append(number + blocks)
         number += int(blocks[-1]) + 1
     limits = BEYOND * np.max([np.abs(motion.states[:, 3:6]).max(axis=0) for motion in motions], axis=0)
-    return Regression(
-        np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch), np.maximum(limits, 1e-3)
-    )
+    return Regression(np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch), np.maximum(limits, 1e-3))
 
 
 def reach(equations: Regression, structure: Structure) -> Array:

@@ -9,7 +9,6 @@ import numpy as np
 from auvsim.base.errors import InputError
 from auvsim.identification.motion import data, fit, lags
 from auvsim.identification.motion.choice import Candidate, Choice, choose
-from auvsim.identification.motion.data import Motion
 from auvsim.identification.motion.fit import STEPS, MotionFit
 from auvsim.identification.motion.lags import Lags
 from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence, rms, roll
@@ -78,10 +77,10 @@ class MotionIdentification:
         low = "" if self.better else "do not trust it: no better than a vehicle that goes on as it began; "
         u, v, r = self.fit.limits / fit.BEYOND
         return (
-            f"{low}open loop it is off by {at.share[k]:.1%} of the distance run after {at.horizons[k]:.0f} s (rms of "
-            f"{at.count[k]} predictions of what was {source}; going on as it began: {self.none[k]:.1%}); its 95 % band of "
-            f"{at.radius[k]:.1%} holds {at.inside[k]:.0%} of them; known for speeds to {u:.2g} m/s, sway to {v:.2g} m/s, "
-            f"{math.degrees(r):.2g} deg/s"
+            f"{low}open loop it is off by {at.share[k]:.1%} of the distance run after {at.horizons[k]:.0f} s (rms "
+            f"of {at.count[k]} predictions of what was {source}; going on as it began: {self.none[k]:.1%}); its 95 % "
+            f"band of {at.radius[k]:.1%} holds {at.inside[k]:.0%} of them; known for speeds to {u:.2g} m/s, sway to "
+            f"{v:.2g} m/s, {math.degrees(r):.2g} deg/s"
         )
 
 

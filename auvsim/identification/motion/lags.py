@@ -43,9 +43,7 @@ def find(records: Sequence[Record]) -> Lags:
     """Lags common to all records; zero where they do not show clearly."""
     speed, speed_deviation = _lag([_reckoning(record) for record in records])
     rate, rate_deviation = _lag([_turning(record) for record in records])
-    return Lags(
-        velocity=speed, velocity_deviation=speed_deviation, yaw_rate=rate, yaw_rate_deviation=rate_deviation
-    )
+    return Lags(velocity=speed, velocity_deviation=speed_deviation, yaw_rate=rate, yaw_rate_deviation=rate_deviation)
 
 
 def without(record: Record, lags: Lags) -> Record:
@@ -71,7 +69,7 @@ def without(record: Record, lags: Lags) -> Record:
 
 
 def _lag(residuals: Sequence[Callable[[float], Array] | None]) -> tuple[float, float]:
-    """The lag of least squares of residuals (b, w) as a function of it, and its deviation by the jackknife of blocks."""
+    """The lag of least squares of residuals (b, w) of it, and its deviation by the jackknife of blocks."""
     there = [residual for residual in residuals if residual is not None]
     tried = np.arange(-LONGEST, LONGEST + 0.01, 0.1)
     if not there:

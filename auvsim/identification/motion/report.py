@@ -96,8 +96,8 @@ def _horizons(found: MotionIdentification) -> Iterator[str]:
         horizon_rows(found),
     )  # fmt: skip
     yield (
-        '<p class="small">Position error by the distance run, rms. Each prediction begins at the smoothed state and takes '
-        "the record's inputs alone; no bias is fitted. The band is the longer semi-axis of its ellipse.</p>"
+        '<p class="small">Position error by the distance run, rms. Each prediction begins at the smoothed state and '
+        "takes the record's inputs alone; no bias is fitted. The band is the longer semi-axis of its ellipse.</p>"
     )
     if found.steps:
         yield "<p>Each step of the chosen structure on what was held out:</p>"

@@ -60,7 +60,7 @@ def roll(
     spread: bool = False,
     every: float = EVERY,
 ) -> Rollouts:
-    """Predicts a motion from every few seconds of it, from the smoothed state there and the record's inputs alone.
+    """Predicts a motion from every few seconds of it, by the smoothed state there and the record's inputs alone.
 
     Args:
         parameters: In the order of `terms.PARAMETERS`.
@@ -88,8 +88,8 @@ def roll(
         first = motion.states[begin[here]]
         x, _, S, P = engine.loops().predict(
             np.ascontiguousarray(first[:, :6]), begin[here], marks[:number], np.ascontiguousarray(record.inputs),
-            parameters, np.asarray(sensitive, dtype=np.int64), np.ascontiguousarray(first[:, 6:8]), step, substeps(step),
-            spread,
+            parameters, np.asarray(sensitive, dtype=np.int64), np.ascontiguousarray(first[:, 6:8]), step,
+            substeps(step), spread,
         )  # fmt: skip
         states[here, :number], sensitivity[here, :number], covariance[here, :number] = x, S, P
         ends = begin[here][:, None] + marks[:number]

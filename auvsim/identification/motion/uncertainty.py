@@ -1,13 +1,15 @@
 """How far a chosen model may be trusted: bands of predictions, their coverage, and fits to disjoint halves compared.
 
 A band has four parts: the coefficients' covariance, white noise of the process, a constant acceleration that the model
-lacks in each prediction, and the error of the first state. The sizes of the last three are the likeliest for predictions
-of what was left out while fitting, and one factor on all makes the band hold as much of those as it says.
+lacks in each prediction, and the error of the first state. The sizes of the last three are the likeliest for
+predictions of what was left out while fitting, and a factor for each horizon makes the band hold as much of those as
+it says.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize
@@ -22,6 +24,7 @@ from estimators.core.types import Array
 from estimators.planar.terms import LABELS, Structure
 
 PROBABILITY = 0.95
+ROUND = 0.1  # share of a position's whole variance that each direction has at least
 BETWEEN = 0.5  # standard deviations among records by which bands are wider than on the mean of them
 CONSTANTS = tuple(LABELS.index(f"{axis} 1") for axis in ("surge", "sway", "yaw"))
 _SEEN = (0, 1, 2)  # of the state: position and heading say what the process does between sensors
@@ -35,7 +38,8 @@ class Spread:
     noise: Array  # (3,) densities of white noise in surge, sway [m2/s3] and yaw [rad2/s3]
     constant: Array  # (3,) standard deviations of the constant acceleration that the model lacks [m/s2, rad/s2]
     first: float  # factor on the variance of the first state, see `rollout_loops.predict`
-    factor: float  # on all of the covariance, so that bands hold what they say on what was left out
+    horizons: Array  # (m,) at which bands were compared with predictions of what was left out [s]
+    factors: Array  # (m,) on all of the covariance there, so that bands hold what they say
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -58,7 +62,9 @@ class Halves:
     rms: float
 
 
-def of_left_out(folds: Folds, structure: Structure, step: str, horizons: Sequence[float]) -> list[tuple[Rollouts, Array]]:
+def of_left_out(
+    folds: Folds, structure: Structure, step: str, horizons: Sequence[float]
+) -> list[tuple[Rollouts, Array]]:
     """Predictions of each part left out by the fit without it, with that fit's covariance."""
     found = []
     for fold, (_, out) in enumerate(folds.splits):
@@ -106,13 +112,25 @@ def spread(left_out: Sequence[tuple[Rollouts, Array]]) -> Spread:
     begin = np.log(np.array([1e-6, 1e-6, 1e-8, 1e-6, 1e-6, 1e-8, 1e-2]))
     best = minimize(cost, begin, method="L-BFGS-B", bounds=[(-40.0, 3.0)] * 6 + [(-12.0, 3.0)], options={"maxiter": 60})
     sizes = np.exp(best.x)
-    draft = Spread(noise=sizes[:3], constant=np.sqrt(sizes[3:6]), first=float(sizes[6]), factor=1.0)
+    at = np.array(left_out[0][0].horizons)
+    draft = Spread(
+        noise=sizes[:3], constant=np.sqrt(sizes[3:6]), first=float(sizes[6]), horizons=at, factors=np.ones(len(at))
+    )
     scores = [_scores(rollouts, covariance, draft) for rollouts, covariance in left_out]
-    logs = np.array([math.log(float(np.quantile(s[np.isfinite(s)], PROBABILITY))) for s in scores if np.isfinite(s).any()])
-    # Records differ from each other by more than predictions of one record do, and the next one is another.
+    return replace(draft, factors=np.array([_factor([one[:, m] for one in scores]) for m in range(len(at))]))
+
+
+def _factor(scores: Sequence[Array]) -> float:
+    """On a covariance, by the scores (s,) of each record, so that it holds what it says of the next one.
+
+    Records differ from each other by more than predictions of one record do.
+    """
+    there = [one[np.isfinite(one)] for one in scores]
+    logs = np.array([math.log(max(float(np.quantile(one, PROBABILITY)), 1e-6)) for one in there if len(one)])
+    if not len(logs):
+        return 1.0
     between = float(np.std(logs, ddof=1)) if len(logs) > 1 else 0.0
-    factor = math.exp(float(np.mean(logs)) + BETWEEN * between) / chi_square(PROBABILITY, 2)
-    return replace(draft, factor=max(factor, 1e-3))
+    return math.exp(float(np.mean(logs)) + BETWEEN * between) / chi_square(PROBABILITY, 2)
 
 
 def position_covariance(rollouts: Rollouts, covariance: Array, found: Spread) -> Array:
@@ -123,7 +141,11 @@ def position_covariance(rollouts: Rollouts, covariance: Array, found: Spread) ->
     P = S[..., :k] @ covariance @ np.swapaxes(S[..., :k], -1, -2)
     P = P + np.einsum("a,smaij->smij", found.noise, W[:, :, :3])
     P = P + np.einsum("a,smia,smja->smij", found.constant**2, S[..., k:], S[..., k:])
-    return found.factor * (P + found.first * W[:, :, 3] + 1e-4 * np.eye(2))
+    P = P + found.first * W[:, :, 3] + 1e-4 * np.eye(2)
+    # An unstable vehicle's linear covariance is a line after a minute; its true errors bend round.
+    P = P + ROUND * np.trace(P, axis1=-2, axis2=-1)[..., None, None] * np.eye(2)
+    factors = np.exp(np.interp(rollouts.horizons, found.horizons, np.log(found.factors)))
+    return factors[:, None, None] * P
 
 
 def _scores(rollouts: Rollouts, covariance: Array, found: Spread) -> Array:
@@ -136,7 +158,9 @@ def _scores(rollouts: Rollouts, covariance: Array, found: Spread) -> Array:
     return np.where(np.isfinite(rollouts.distance) & ~there, np.inf, found_scores)
 
 
-def held(fit: MotionFit, motions: Sequence[Motion], covariance: Array, found: Spread, horizons: Sequence[float]) -> Held:
+def held(
+    fit: MotionFit, motions: Sequence[Motion], covariance: Array, found: Spread, horizons: Sequence[float]
+) -> Held:
     """Errors of predictions of motions, and what their bands hold, horizon by horizon."""
     rolled = [_spread_out(fit, motion, horizons) for motion in motions]
     return held_of([(rollouts, covariance) for rollouts in rolled], found)
@@ -144,7 +168,13 @@ def held(fit: MotionFit, motions: Sequence[Motion], covariance: Array, found: Sp
 
 def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
     """The same of predictions that are made."""
-    alone = Spread(noise=np.zeros(3), constant=np.zeros(3), first=0.0, factor=1.0)
+    alone = Spread(
+        noise=np.zeros(3),
+        constant=np.zeros(3),
+        first=0.0,
+        horizons=found.horizons,
+        factors=np.ones(len(found.horizons)),
+    )
     scores = np.concatenate([_scores(r, c, found) for r, c in left_out])
     plain = np.concatenate([_scores(r, c, alone) for r, c in left_out])
     shares = np.concatenate([r.shares for r, _ in left_out])
@@ -176,7 +206,7 @@ def halves(motions: Sequence[Motion], structure: Structure, step: str) -> Halves
         for motion in motions:
             count = max(1, min(4, int(motion.duration // _SHORTEST)))
             edges = np.linspace(0, len(motion.record.times), count + 1).astype(int)
-            parts += [slices(motion, int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+            parts += [slices(motion, a, b) for a, b in pairwise(edges.tolist())]
     both = []
     for half in (parts[::2], parts[1::2]):
         equations = fits.regression(half)
