@@ -165,8 +165,8 @@ class Identify:
 
     Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model
     of `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle)
-    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with named
-    columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
+    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with
+    named columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
     clockwise from north.
     """
 

@@ -56,20 +56,21 @@ def run(
     judging = read(holdout, vehicle=vehicle, columns=columns) if holdout else None
     if not (engine.is_warm() and (vehicle is None or compiled.is_warm())):
         print(COMPILING.format("identification"), file=sys.stderr)
-    written = []
+    written: list[Path] = []
     with output_folder(out):
-        motion = None
-        if not steps:
-            with report.IdentificationProgress() as progress:
-                found = "vehicle" if vehicle is None else _stem(vehicle)
-                motion = identify_motion(readings, judging, name=found, quick=quick, progress=progress)
-            written += _write_motion(motion, out, alone=vehicle is None)
-            show_motion(motion)
-        if vehicle is not None:
-            with report.IdentificationProgress() as progress:
+        planar = motion = None
+        with report.IdentificationProgress() as progress:
+            if vehicle is not None:
                 planar = identify(
                     readings, judging, vehicle=_stem(vehicle), model=vehicle, steps=chosen, progress=progress
                 )
+            if not steps:
+                named = "vehicle" if vehicle is None else _stem(vehicle)
+                motion = identify_motion(readings, judging, name=named, quick=quick, progress=progress)
+        if motion is not None:
+            written += _write_motion(motion, out, alone=planar is None)
+            show_motion(motion)
+        if planar is not None:
             written += _write(planar, out, target)
             show(planar)
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)

@@ -196,6 +196,9 @@ def test_the_command_leaves_what_a_trial_believes(
         write(tmp_path / f"{kind}.csv", table)
     arguments = ["identify", str(tmp_path / "multisine.csv"), "--holdout", str(tmp_path / "zigzag.csv")]
     arguments += ["--out", str(tmp_path / "out"), "--name", "lake", "--steps", "segments"]
+    assert cli.main(arguments) == 2
+    assert "give --vehicle too" in capsys.readouterr().err
+    arguments += ["--vehicle", "remus100"]
     assert cli.main(arguments) == 0
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "parameters.yaml",
@@ -210,8 +213,8 @@ def test_the_command_leaves_what_a_trial_believes(
     assert "planar model of remus100" in output.out
     assert "parameters.yaml" in output.err
     for flags, said in (
-        (["--name", "a/b"], "plain name"),
-        (["--steps", "guess"], "no step 'guess'"),
+        (["--vehicle", "remus100", "--name", "a/b"], "plain name"),
+        (["--vehicle", "remus100", "--steps", "guess"], "no step 'guess'"),
         (["--vehicle", "remus"], "no vehicle 'remus'"),
     ):
         assert cli.main([*arguments[:2], "--out", str(tmp_path / "none"), *flags]) == 2
