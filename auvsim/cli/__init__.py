@@ -180,6 +180,14 @@ class Identify:
     """Which column is what, where names do not say: `rudder: {column: d, unit: deg, sign: -1}`."""
     vehicle: str | None = None
     """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit of the planar model starts."""
+    length: float | None = None
+    """Length of the hull [m]; with beam, draught and mass it says what is known of the motion before the logs."""
+    beam: float | None = None
+    """Beam of the hull [m]."""
+    draught: float | None = None
+    """Draught of the hull, of a submerged body half its height [m]."""
+    mass: float | None = None
+    """Mass of the vehicle [kg]."""
     quick: bool = False
     """Fewer structures and steps on a coarser grid: some seconds."""
     name: str | None = None
@@ -269,6 +277,7 @@ def _run(arguments: list[str]) -> int:
         return identify.run(
             command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
             vehicle=command.vehicle, name=command.name, steps=command.steps, quick=command.quick,
+            hull=(command.length, command.beam, command.draught, command.mass),
         )  # fmt: skip
 
     if isinstance(command, Reproduce):

@@ -16,6 +16,7 @@ from auvsim.identification import compiled, product
 from auvsim.identification import report as page
 from auvsim.identification.motion import engine, files
 from auvsim.identification.motion import report as motion_page
+from auvsim.identification.motion.dimensions import Dimensions
 from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
 from auvsim.identification.pipeline import STEPS, Identification, identify
 from auvsim.identification.readers import models, read
@@ -35,6 +36,7 @@ def run(
     name: str | None = None,
     steps: Sequence[str] = (),
     quick: bool = False,
+    hull: Sequence[float | None] = (None,) * 4,
 ) -> int:
     """Identifies, fills the folder, prints what was found and returns the exit code.
 
@@ -50,6 +52,7 @@ def run(
     if vehicle is None and (name is not None or steps):
         flag = "--name" if name is not None else "--steps"
         raise InputError(f"command line: {flag} is of a known vehicle's planar model; give --vehicle too")
+    known = _hull(hull)
     target = None if name is None or vehicle is None else _target(name, vehicle)
     chosen = _steps(steps)
     readings = read(logs, vehicle=vehicle, columns=columns)
@@ -66,7 +69,7 @@ def run(
                 )
             if not steps:
                 named = "vehicle" if vehicle is None else _stem(vehicle)
-                motion = identify_motion(readings, judging, name=named, quick=quick, progress=progress)
+                motion = identify_motion(readings, judging, name=named, hull=known, quick=quick, progress=progress)
         if motion is not None:
             written += _write_motion(motion, out, alone=planar is None)
             show_motion(motion)
@@ -75,6 +78,16 @@ def run(
             show(planar)
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
+
+
+def _hull(given: Sequence[float | None]) -> Dimensions | None:
+    """Length, beam, draught and mass: all of them, or none."""
+    numbers = [value for value in given if value is not None]
+    if not numbers:
+        return None
+    if len(numbers) < len(given):
+        raise InputError("command line: --length, --beam, --draught and --mass go together; give all four or none")
+    return Dimensions(**dict(zip(("length", "beam", "draught", "mass"), numbers, strict=True)))
 
 
 def _vehicle(paths: Sequence[Path]) -> str | None:

@@ -6,7 +6,7 @@ steps.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -68,12 +68,12 @@ class Choice:
 class Folds:
     """Motions with each part left out in turn, and their fits, which are made once."""
 
-    def __init__(self, motions: Sequence[Motion], horizon: float | None = None) -> None:
+    def __init__(self, motions: Sequence[Motion], before: Mapping[str, float] | None = None) -> None:
         self.motions = list(motions)
         self.splits, self.said = _splits(self.motions)
-        self.equations = [fits.regression(rest) for rest, _ in self.splits]
-        self.whole = fits.regression(self.motions)
-        self.horizon = horizon or min(HORIZON, horizons([m for _, out in self.splits for m in out], (HORIZON,))[-1])
+        self.equations = [fits.regression(rest, before) for rest, _ in self.splits]
+        self.whole = fits.regression(self.motions, before)
+        self.horizon = min(HORIZON, horizons([m for _, out in self.splits for m in out], (HORIZON,))[-1])
         self._fits: dict[tuple[tuple[str, ...], str, int], MotionFit] = {}
 
     def fit(self, structure: Structure, step: str, fold: int) -> MotionFit:
@@ -113,6 +113,7 @@ def choose(
     motions: Sequence[Motion],
     structures: Sequence[Structure] = STRUCTURES,
     *,
+    before: Mapping[str, float] | None = None,
     quick: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> Choice:
@@ -121,11 +122,12 @@ def choose(
     Args:
         motions: What was measured.
         structures: From the simplest; wind and asymmetry are added to the best.
+        before: Coefficients that are known before, see `dimensions`.
         quick: Fewer structures go on to fewer steps.
         progress: Called with what is being done and the share that is done.
     """
     say = progress or (lambda text, share: None)
-    folds = Folds(motions)
+    folds = Folds(motions, before)
     windy = any(np.any(motion.record.inputs[:, 2:]) for motion in motions)
     bases = [seen(folds.whole, with_terms(structure, WIND if windy else ())) for structure in structures]
     found: list[Candidate] = []

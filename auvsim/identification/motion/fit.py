@@ -4,7 +4,7 @@ Deviations of the channels are those of the fit's own residuals, found by iterat
 lacks and not only what the sensors' data sheets say.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -13,6 +13,7 @@ import numpy as np
 from auvsim.identification.fit import invert
 from auvsim.identification.motion import engine
 from auvsim.identification.motion.data import Motion, nuisances
+from auvsim.identification.motion.dimensions import UNSURE
 from auvsim.identification.segment_problem import Point, Problem, SegmentOptions, minimise
 from estimators.core.types import Array
 from estimators.planar.terms import LABELS, LIMITS, TERMS, Structure, vector
@@ -76,10 +77,23 @@ class Regression(NamedTuple):
     changes: Array  # (w, 3)
     stretch: Array  # (w,) which block of the data an equation belongs to
     limits: Array  # (3,) of the velocities, see BEYOND
+    centre: Array  # (terms,) about which the weak prior lies
+    unsure: Array  # (terms,) standard deviation of what is known before; infinite: nothing
 
 
-def regression(motions: Sequence[Motion], block: float = 60.0) -> Regression:
-    """Changes of velocity over windows, and the integrals of all terms over them."""
+def regression(
+    motions: Sequence[Motion], before: Mapping[str, float] | None = None, *, block: float = 60.0
+) -> Regression:
+    """Changes of velocity over windows, and the integrals of all terms over them.
+
+    Args:
+        motions: What was measured.
+        before: Coefficients that are known to within `dimensions.UNSURE` of their size.
+        block: Of the stretches that count as one [s].
+    """
+    centre, unsure = np.zeros(len(TERMS)), np.full(len(TERMS), np.inf)
+    for label, value in (before or {}).items():
+        centre[LABELS.index(label)], unsure[LABELS.index(label)] = value, UNSURE * abs(value)
     every = np.arange(len(LABELS))
     zero = vector({})
     terms, changes, stretch, number = [], [], [], 0
@@ -101,23 +115,25 @@ def regression(motions: Sequence[Motion], block: float = 60.0) -> Regression:
         stretch.append(number + blocks)
         number += int(blocks[-1]) + 1
     limits = BEYOND * np.max([np.abs(motion.states[:, 3:6]).max(axis=0) for motion in motions], axis=0)
-    return Regression(np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch), np.maximum(limits, 1e-3))
+    joined = np.concatenate(terms), np.concatenate(changes), np.concatenate(stretch)
+    return Regression(*joined, np.maximum(limits, 1e-3), centre, unsure)
 
 
 def reach(equations: Regression, structure: Structure) -> Array:
-    """Standard deviations (k,) of the weak prior about zero; a term that the data never move is held at zero."""
+    """Standard deviations (k,) of the weak prior; a term that the data never move is held at its centre."""
     places = list(structure.places)
     axes = np.array([TERMS[place].axis for place in places])
     size = np.sqrt(np.mean(equations.terms[:, axes, places] ** 2, axis=0))
     moved = np.sqrt(np.mean(equations.changes**2, axis=0))[axes]
-    return np.where(size > 0.0, WIDE * moved / np.where(size > 0.0, size, 1.0), 1e-9) + 1e-12
+    wide = np.where(size > 0.0, WIDE * moved / np.where(size > 0.0, size, 1.0), 1e-9) + 1e-12
+    return np.minimum(wide, equations.unsure[places])
 
 
 def least_squares(motions: Sequence[Motion], structure: Structure, equations: Regression | None = None) -> MotionFit:
     """Ordinary least squares of each axis with the weak prior."""
     found = regression(motions) if equations is None else equations
     places = np.array(structure.places)
-    wide = reach(found, structure)
+    wide, centre = reach(found, structure), found.centre[places]
     k = len(places)
     values, information = np.zeros(k), np.diag(1.0 / wide**2)
     blocks = [(np.zeros((k, k)), np.zeros(k)) for _ in range(int(found.stretch.max()) + 1)]
@@ -130,7 +146,9 @@ def least_squares(motions: Sequence[Motion], structure: Structure, equations: Re
         for _ in range(2):  # the residuals of the first weigh the prior of the second
             rows = np.vstack([A * weight, np.diag(1.0 / wide[own])])
             scale = np.linalg.norm(rows, axis=0)
-            solved = np.linalg.lstsq(rows / scale, np.concatenate([b * weight, np.zeros(len(own))]), rcond=1e-12)[0]
+            solved = np.linalg.lstsq(rows / scale, np.concatenate([b * weight, centre[own] / wide[own]]), rcond=1e-12)[
+                0
+            ]
             values[own] = solved / scale
             weight = 1.0 / max(float(np.std(b - A @ values[own])), 1e-9)
         rest = (b - A @ values[own]) * weight

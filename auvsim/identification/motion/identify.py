@@ -9,6 +9,7 @@ import numpy as np
 from auvsim.base.errors import InputError
 from auvsim.identification.motion import data, fit, lags
 from auvsim.identification.motion.choice import Candidate, Choice, choose
+from auvsim.identification.motion.dimensions import Dimensions, coefficients
 from auvsim.identification.motion.fit import STEPS, MotionFit
 from auvsim.identification.motion.lags import Lags
 from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence, rms, roll
@@ -16,7 +17,7 @@ from auvsim.identification.motion.uncertainty import Halves, Held, Spread, halve
 from auvsim.identification.records import Readings, Record
 from estimators.core.types import Array
 from estimators.planar.model import PlanarParameters
-from estimators.planar.terms import AXES, PLANAR, STRUCTURES, TermsProcess, planar_parameters
+from estimators.planar.terms import AXES, PLANAR, TermsProcess, planar_parameters
 
 LEAST = 40.0  # of data in all [s]
 STILL = math.radians(0.3)  # a rudder that moves less than this excites nothing [rad]
@@ -89,6 +90,7 @@ def identify_motion(
     holdout: Readings | None = None,
     *,
     name: str = "vehicle",
+    hull: Dimensions | None = None,
     quick: bool = False,
     progress: Callable[[str, float], None] | None = None,
 ) -> MotionIdentification:
@@ -98,6 +100,7 @@ def identify_motion(
         readings: What was read.
         holdout: What is held out, and judges it; None: cross-validation alone does.
         name: Of the vehicle.
+        hull: What is known before the records; None: nothing.
         quick: On a coarser grid, with fewer candidates.
         progress: Called with what is being done and the share that is done.
 
@@ -111,7 +114,8 @@ def identify_motion(
     coarsest = data.QUICK if quick else data.COARSEST
     motions = data.prepare(readings.records, coarsest=coarsest, known=known)
     judging = data.prepare(holdout.records, coarsest=coarsest, known=known) if holdout is not None else []
-    choice = choose(motions, STRUCTURES, quick=quick, progress=lambda text, share: say(text, 0.05 + 0.7 * share))
+    before = None if hull is None else coefficients(hull)
+    choice = choose(motions, before=before, quick=quick, progress=lambda text, share: say(text, 0.05 + 0.7 * share))
     chosen, folds = choice.chosen, choice.folds
     say("bands", 0.8)
     reached = horizons([m for _, out in folds.splits for m in out], HORIZONS)
