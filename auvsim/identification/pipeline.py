@@ -21,7 +21,7 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.core.consistency import chi_square
 from estimators.docking.models import steady_surge
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import SURGE_LIMIT, PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
 LENGTH = 20.0  # of the segments fitted [s]
@@ -308,6 +308,10 @@ def _verdicts(found: Identification) -> list[Verdict]:
             said.append(Verdict(good=False, text=f"on {judged.record.name} its start is better: {_shares(judged)}"))
     if not fit.converged:
         said.append(Verdict(good=False, text=f"the last step has not converged: {fit.message}"))
+    fastest = max(float(np.nanmax(np.abs(r.measured[:, [3, 6]]), initial=0.0)) for r in found.fitted)
+    if fastest > SURGE_LIMIT:
+        text = f"the planar model counts speeds beyond {SURGE_LIMIT:g} m/s as these; the data go to {fastest:.2g} m/s"
+        said.append(Verdict(good=False, text=text))
     said += _identifiable(found)
     coloured = [NAMES[c] for c, test in enumerate(fit.whiteness) if test is not None and test.probability < 0.01]
     if coloured:

@@ -22,7 +22,7 @@ from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS
 HORIZON = 60.0  # of the predictions that decide [s]
 FOLDS = 4
 KEPT = 2  # structures that go on to all steps
-EQUAL = 0.1  # a simpler model is no worse than the best one by more than this share of its error
+EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
 SHORTEST = 40.0  # of a part of a record that is left out [s]
 FIRST_STEPS = STEPS[:2]
 
@@ -45,12 +45,12 @@ class Candidate:
     @property
     def parts(self) -> Array:
         """Mean square of each part left out."""
-        return np.array([np.nanmean(shares[:, -1] ** 2) for shares in self.shares])
+        return np.array([float(np.nanmean(shares[:, -1] ** 2)) for shares in self.shares])
 
     @property
-    def size(self) -> int:
-        """Terms, and half a term for each step from least squares on."""
-        return 2 * len(self.structure.terms) + STEPS.index(self.step)
+    def size(self) -> tuple[int, float]:
+        """What makes it less simple than another: its terms; of as many, its error."""
+        return len(self.structure.terms), self.error
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

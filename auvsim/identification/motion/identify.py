@@ -16,7 +16,7 @@ from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence
 from auvsim.identification.motion.uncertainty import Halves, Held, Spread, halves, held, held_of, of_left_out, spread
 from auvsim.identification.records import Readings, Record
 from estimators.core.types import Array
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import SURGE_LIMIT, SWAY_LIMIT, YAW_RATE_LIMIT, PlanarParameters
 from estimators.planar.terms import AXES, PLANAR, TermsProcess, planar_parameters
 
 LEAST = 40.0  # of data in all [s]
@@ -117,13 +117,14 @@ def identify_motion(
     before = None if hull is None else coefficients(hull)
     choice = choose(motions, before=before, quick=quick, progress=lambda text, share: say(text, 0.05 + 0.7 * share))
     chosen, folds = choice.chosen, choice.folds
-    say("bands", 0.8)
-    reached = horizons([m for _, out in folds.splits for m in out], HORIZONS)
-    left_out = of_left_out(folds, chosen.structure, chosen.step, reached)
-    found = spread(left_out)
-    say("disjoint halves", 0.85)
+    say("disjoint halves", 0.8)
     apart = halves(motions, chosen.structure, chosen.step)
-    own = fit.covariance(choice.fit) * max(1.0, apart.rms**2)
+    widened = max(1.0, apart.rms**2)
+    own = widened * fit.covariance(choice.fit)
+    say("bands", 0.85)
+    reached = horizons([m for _, out in folds.splits for m in out], HORIZONS)
+    left_out = of_left_out(folds, chosen.structure, chosen.step, reached, widened)
+    found = spread(left_out)
     say("predicting what was held out", 0.95)
     ends = horizons(judging, HORIZONS) if judging else reached
     judged = held(choice.fit, judging, own, found, ends) if judging else None
@@ -168,8 +169,18 @@ def _planar(choice: Choice) -> tuple[Candidate, MotionFit] | None:
 
 
 def planar(found: MotionIdentification, masses: PlanarParameters | None = None) -> PlanarParameters | None:
-    """Parameters of the planar model that comes nearest, with unit masses if none are given; None: none comes near."""
-    return None if found.planar is None else planar_parameters(found.planar[1].coefficients, masses)
+    """Parameters of the planar model that comes nearest, with unit masses if none are given; None: none does.
+
+    The planar model counts velocities beyond its own limits as these; of a vehicle that goes there it is none.
+    """
+    if found.planar is None or _too_fast(found):
+        return None
+    return planar_parameters(found.planar[1].coefficients, masses)
+
+
+def _too_fast(found: MotionIdentification) -> bool:
+    """Whether the data go beyond the limits of the docking filters' planar model."""
+    return bool(np.any(found.fit.limits / fit.BEYOND > (SURGE_LIMIT, SWAY_LIMIT, YAW_RATE_LIMIT)))
 
 
 def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
@@ -195,6 +206,10 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
     if lost:
         said.append((False, f"not converged, and not kept: {', '.join(lost)}"))
     said += [(False, note) for note in found.notes]
+    if _too_fast(found):
+        text = f"the docking filters' planar model ends at {SURGE_LIMIT:g} m/s, {SWAY_LIMIT:g} m/s of sway and "
+        text += f"{math.degrees(YAW_RATE_LIMIT):.0f} deg/s, this vehicle does not: no parameters.yaml"
+        said.append((False, text))
     driving = [axis for axis, factor in zip(AXES, _growth(found), strict=True) if factor > 1.0]
     if driving:
         text = f"beyond its limits the terms of {', '.join(driving)} would drive the vehicle: there it is held"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from auvsim.identification.fit import Indices
 from auvsim.identification.motion import engine
 from auvsim.identification.motion.data import Motion
 from auvsim.identification.states import substeps
@@ -15,14 +16,14 @@ from estimators.planar.terms import vector
 HORIZONS = (10.0, 30.0, 60.0, 120.0)  # [s]
 EVERY = 10.0  # from one start to the next [s]
 LEAD = 5.0  # before the first: the smoother's states settle within it [s]
-_NONE = np.empty(0, dtype=np.int64)
+_NONE: Indices = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Rollouts:
     """Predictions of one motion; NaN where a model ran away."""
 
-    begin: Array  # (s,) samples at which they begin
+    begin: Indices  # (s,) samples at which they begin
     horizons: tuple[float, ...]  # [s]
     states: Array  # (s, m, 6) predicted
     measured: Array  # (s, m, 6) smoothed without hydrodynamics
@@ -56,7 +57,7 @@ def roll(
     motion: Motion,
     wanted: Sequence[float],
     *,
-    sensitive: Array = _NONE,
+    sensitive: Indices = _NONE,
     spread: bool = False,
     every: float = EVERY,
 ) -> Rollouts:

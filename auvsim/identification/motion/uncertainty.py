@@ -63,13 +63,13 @@ class Halves:
 
 
 def of_left_out(
-    folds: Folds, structure: Structure, step: str, horizons: Sequence[float]
+    folds: Folds, structure: Structure, step: str, horizons: Sequence[float], widened: float = 1.0
 ) -> list[tuple[Rollouts, Array]]:
-    """Predictions of each part left out by the fit without it, with that fit's covariance."""
+    """Predictions of each part left out by the fit without it, with that fit's covariance times `widened`."""
     found = []
     for fold, (_, out) in enumerate(folds.splits):
         fit = folds.fit(structure, step, fold)
-        own = fits.covariance(fit)
+        own = widened * fits.covariance(fit)
         found += [(_spread_out(fit, motion, horizons), own) for motion in out]
     return found
 
