@@ -1,6 +1,7 @@
 """Motion models of any structure, on a tanker whose equations are none of the package's."""
 
 import math
+import time
 from dataclasses import replace
 from pathlib import Path
 
@@ -33,6 +34,7 @@ from estimators.planar.terms import (
 )
 
 SEA = tanker.Sea(disturbance=2e-4)
+WINDY = tanker.Sea(wind=(3.0, 2.0), gust=1.0, disturbance=5e-4)
 KINDS = ("zigzag20", "steps", "turns", "multisine")
 
 
@@ -240,18 +242,43 @@ def test_sensitivities_and_noise_of_predictions() -> None:
 
 
 def test_the_choice_beats_planar_least_squares(found: MotionIdentification, runs: list[tanker.Run]) -> None:
-    """On what is held out: at most 0.7 of planar least squares, and 1.03 of the best of four baselines."""
-    errors = {
-        name: baselines.error(runs[3:], of(runs[:3], terms), terms)
-        for name, of, terms in (
-            ("planar", baselines.ordinary, baselines.planar), ("abkowitz", baselines.ordinary, baselines.abkowitz)
-        )
-    }  # fmt: skip
+    """On what is held out at most 0.7 of the planar model by least squares: the tanker's structure is richer."""
     share = found.judged.share[found.place]
     assert found.choice.horizon == found.judged.horizons[found.place] == 60.0
-    assert share < 0.7 * errors["planar"]
-    assert share < 1.03 * min(errors.values())
+    assert share < 0.7 * baselines.error(runs[3:], baselines.ordinary(runs[:3]))
     assert found.better
+
+
+@pytest.mark.slow
+def test_no_baseline_is_better_on_the_whole(tmp_path: Path) -> None:
+    """The whole choice over four seas of seeds that nothing was tuned on, by geometric means of errors after 60 s.
+
+    Never worse than the best of least squares and SciPy's output error by more than 3 %, at most 0.7 of planar least
+    squares, within 60 s of CPU each. Bands of 95 % hold 85 to 100 % of the predictions of these eight records: with
+    some five independent ones a record the pooled share has a standard deviation of 3.5 %.
+    """
+    ratios, planar, inside, counts = [], [], [], []
+    for seed, sea in ((31, SEA), (31, WINDY), (32, SEA), (32, WINDY)):
+        sailed = [tanker.sail(kind, seed, sea) for kind in tanker.KINDS]
+        paths = [tanker.write(tmp_path / f"{run.kind}.csv", run.log) for run in sailed]
+        errors = [
+            baselines.error(sailed[4:], of(sailed[:4], terms), terms)
+            for of, terms in (
+                (baselines.ordinary, baselines.planar), (baselines.ordinary, baselines.abkowitz),
+                (baselines.output_error, baselines.planar),
+            )
+        ]  # fmt: skip
+        begun = time.process_time()
+        judged = identify_motion(read(paths[:4]), read(paths[4:]))
+        assert time.process_time() - begun < 60.0
+        share = judged.judged.share[judged.place]
+        ratios.append(share / min(errors))
+        planar.append(share / errors[0])
+        inside.append(judged.judged.inside)
+        counts.append(judged.judged.count)
+    assert np.exp(np.mean(np.log(ratios))) < 1.03
+    assert np.exp(np.mean(np.log(planar))) < 0.7
+    assert 0.85 < np.average(inside, weights=counts) <= 1.0
 
 
 def test_the_report_begins_with_trust(found: MotionIdentification) -> None:

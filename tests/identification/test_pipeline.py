@@ -15,6 +15,7 @@ from auvsim.identification import judgement, pictures, pipeline, product, report
 from auvsim.identification.fit import DEFAULT_FREE, with_values
 from auvsim.identification.pipeline import Identification, identify
 from auvsim.identification.records import Readings, Record
+from auvsim.identification.segments import SegmentOptions
 from auvsim.identification.simulated import Kind, Vessel, simulate
 from auvsim.physics import planar_sets
 from auvsim.physics.planar_sets import Source
@@ -220,6 +221,32 @@ def test_the_command_leaves_what_a_trial_believes(
         assert cli.main([*arguments[:2], "--out", str(tmp_path / "none"), *flags]) == 2
         assert said in capsys.readouterr().err
         assert not (tmp_path / "none").exists()
+
+
+def test_deviations_bear_what_a_fit_leaves() -> None:
+    """Sensors that are believed ten times too good are weighed by residuals: the true deviations come back within 30 %.
+
+    A channel has some hundred samples or more, of which the fit's own unknowns take a few; positions have fifty.
+    """
+    true = record("multisine", 6, 200.0)
+    boastful = replace(true, deviations=true.deviations / 10.0)
+    found, weighed = pipeline._reweighted([boastful], TRUE, DEFAULT_FREE)
+    seen = np.isfinite(found.residual_rms)
+    np.testing.assert_allclose(weighed[0].deviations[seen], true.deviations[seen], rtol=0.3)
+    assert np.nanmax(found.residual_rms) < pipeline.LACKING
+    _, same = pipeline._reweighted([true], TRUE, DEFAULT_FREE)
+    np.testing.assert_array_equal(same[0].deviations, true.deviations)
+
+
+def test_the_step_that_predicts_best_is_kept() -> None:
+    """A last step that was led astray is not the result; one that is as good as another is."""
+    runs = [record("multisine", 7, 100.0)]
+    good = pipeline.fit_segments(runs, TRUE, DEFAULT_FREE, SegmentOptions(length=20.0))
+    astray = replace(good, method="prediction error", parameters=wrong(0.5))
+    kept, said = pipeline._kept(runs, TRUE, [good, astray])
+    assert kept == 0
+    assert "kept: segments" in said[0].text
+    assert pipeline._kept(runs, TRUE, [good, replace(good, method="prediction error")]) == (-1, [])
 
 
 @pytest.mark.slow

@@ -35,7 +35,7 @@ class Candidate:
     step: str
     shares: tuple[Array, ...]  # of each part left out, (s, m): position error by the distance run
     deviation: float  # standard error of `error` over the parts
-    converged: bool
+    converged: bool  # all of the fits
 
     @property
     def error(self) -> float:
@@ -92,14 +92,15 @@ class Folds:
         if step == STEPS[0]:
             return fits.least_squares(motions, structure, equations)
         guess = self.fit(structure, STEPS[STEPS.index(step) - 1], fold)
-        deviations = self.fit(structure, step, -1).deviations if fold >= 0 else None
-        return fits.segments(motions, guess, step, equations, deviations=deviations)
+        like = self.fit(structure, step, -1) if fold >= 0 else None
+        return fits.segments(motions, guess, step, equations, like=like)
 
     def candidate(self, structure: Structure, step: str) -> Candidate:
         """Fits without each part, and their predictions of it."""
         shares, converged = [], self.fit(structure, step, -1).converged
         for fold, (_, out) in enumerate(self.splits):
             found = self.fit(structure, step, fold)
+            converged &= found.converged
             shares += [roll(found.vector, motion, (self.horizon,)).shares for motion in out]
         parts = np.array([np.nanmean(share[:, -1] ** 2) for share in shares])
         error = math.sqrt(float(parts.mean()))

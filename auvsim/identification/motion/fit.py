@@ -171,7 +171,7 @@ def segments(
     step: str,
     equations: Regression | None = None,
     *,
-    deviations: Array | None = None,
+    like: MotionFit | None = None,
     max_iterations: int = 30,
 ) -> MotionFit:
     """Fits the motion over segments from where another fit of the structure ended.
@@ -185,7 +185,8 @@ def segments(
         guess: Where it begins; its deviations too if it came of segments.
         step: Of STEPS, but the first.
         equations: Those of the motions; they are made if None.
-        deviations: Of the channels (8,), as another fit found them; None: they are found from residuals.
+        like: A fit of the same structure and step to more data: the search begins there, with its deviations. None: it
+            begins at the guess, and deviations are found from residuals.
         max_iterations: Of each round.
     """
     structure = guess.structure
@@ -196,9 +197,8 @@ def segments(
     prior = np.diag(1.0 / reach(found, structure) ** 2) + FORGET * guess.information / guess.worth
     own = nuisances([motion.record for motion in motions])
     options = SegmentOptions(nuisances=own, max_iterations=max_iterations, loss="huber", threshold=THRESHOLD)
-    rounds = 1 if deviations is not None else ROUNDS
-    deviations = guess.deviations if deviations is None else deviations
-    values, used = guess.values, 0
+    rounds = 1 if like is not None else ROUNDS
+    deviations, values, used = (like or guess).deviations, (like or guess).values, 0
     point = problem = None
     converged = False
     for turn in range(rounds):

@@ -28,11 +28,11 @@ class Lags:
     def notes(self) -> list[str]:
         """What is to be said of them."""
         named = (
-            ("velocities", "positions", self.velocity, self.velocity_deviation),
-            ("the yaw rate", "the heading", self.yaw_rate, self.yaw_rate_deviation),
+            ("velocities show", "positions", self.velocity, self.velocity_deviation),
+            ("the yaw rate shows", "the heading", self.yaw_rate, self.yaw_rate_deviation),
         )
         return [
-            f"{what} show {abs(lag):.2f} s {'later' if lag > 0.0 else 'earlier'} than {against} (standard deviation "
+            f"{what} {abs(lag):.2f} s {'later' if lag > 0.0 else 'earlier'} than {against} (standard deviation "
             f"{deviation:.2f} s): taken out"
             for what, against, lag, deviation in named
             if lag
