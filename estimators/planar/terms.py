@@ -19,7 +19,7 @@ import numpy as np
 from estimators.core import loops
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.kernels import step_kernels
-from estimators.core.types import Array
+from estimators.core.types import Array, ProcessModel
 from estimators.planar.model import MAX_SUBSTEP, PlanarParameters
 
 INPUTS = 4
@@ -186,7 +186,7 @@ def kernels() -> ModuleType:
     return step_kernels(step_function(), wrapped=(2,))
 
 
-class MotionModel(Protocol):
+class MotionModel(ProcessModel, Protocol):
     """What a filter needs of a planar motion, whatever its structure; `PlanarProcess` and `TermsProcess` keep to it.
 
     The state is [north, east, heading, u, v, r, current north, current east].
@@ -196,18 +196,6 @@ class MotionModel(Protocol):
 
     def propagate(self, mean: Array, covariance: Array, u: Sequence[float], dt: float) -> tuple[Array, Array, int]:
         """Mean and covariance after `dt` [s] with the input held, and the substeps it took."""
-        ...
-
-    def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
-        """State after `dt` [s]."""
-        ...
-
-    def jacobian(self, x: Array, u: Sequence[float], dt: float) -> Array:
-        """Derivative of `evaluate` by the state."""
-        ...
-
-    def covariance(self, x: Array, u: Sequence[float], dt: float) -> Array:
-        """Noise gathered over `dt`."""
         ...
 
     def move(self, points: Array, u: Sequence[float], dt: float) -> Array:

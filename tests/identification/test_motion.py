@@ -20,6 +20,8 @@ from auvsim.identification.motion.rollout import persistence, roll
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
 from auvsim.physics import planar_sets
+from estimators.core import ekf
+from estimators.core.types import Gaussian
 from estimators.planar.model import PlanarParameters, PlanarProcess
 from estimators.planar.terms import (
     ASYMMETRY,
@@ -27,6 +29,7 @@ from estimators.planar.terms import (
     LIMITS,
     PLANAR,
     STRUCTURES,
+    MotionModel,
     TermsProcess,
     planar_parameters,
     structure,
@@ -305,6 +308,43 @@ def test_a_model_is_read_as_it_was_written(found: MotionIdentification, tmp_path
     if "yaw udu" in text:
         with pytest.raises(InputError, match="no such term"):
             files.read(tmp_path / "wrong.yaml")
+
+
+def test_a_filter_believes_any_structure(found: MotionIdentification, runs: list[tanker.Run]) -> None:
+    """The chosen model and the planar one by one contract, in the filters' own EKF, with a fix every 10 s.
+
+    Before each fix the chosen model is off by less than half of what a vehicle that goes on as it began would be, and
+    its innovations are of the size it believes, within a factor of four.
+    """
+    chosen: MotionModel = files.motion_model(found).process(current=1e-8)
+    still: MotionModel = TermsProcess({}, chosen.noise)
+    planar: MotionModel = PlanarProcess(planar_parameters({"yaw uud": 0.01, "yaw r": -0.1}), chosen.noise)
+    truth, times = runs[3].truth, runs[3].times
+    signals = baselines.signals(runs[3])
+    off = {}
+    for name, model in (("chosen", chosen), ("still", still), ("planar", planar)):
+        belief = Gaussian(
+            mean=np.array([*truth[0], 0.0, 0.0]), covariance=np.diag([0.01, 0.01, 1e-4, 1e-3, 1e-3, 1e-5, 1e-6, 1e-6])
+        )  # fmt: skip
+        errors, scores = [], []
+        for k in range(1, len(times)):
+            belief = ekf.predict(belief, model, signals[6:8, k - 1].tolist(), float(times[k] - times[k - 1]))
+            if k % 50:
+                continue
+            residual = signals[:2, k] - belief.mean[:2]
+            S = belief.covariance[:2, :2] + 0.01 * np.eye(2)
+            errors.append(np.hypot(*residual))
+            scores.append(residual @ np.linalg.solve(S, residual))
+            H = np.eye(2, 8)
+            gain = belief.covariance @ H.T @ np.linalg.inv(S)
+            belief = Gaussian(
+                mean=belief.mean + gain @ residual, covariance=belief.covariance - gain @ S @ gain.T
+            )  # fmt: skip
+        off[name] = float(np.sqrt(np.mean(np.square(errors))))
+        if name == "chosen":
+            assert 0.25 < np.mean(scores) / 2.0 < 4.0
+    assert off["chosen"] < 0.5 * off["still"]
+    assert np.isfinite(off["planar"])
 
 
 def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -101,7 +101,8 @@ class Folds:
         for fold, (_, out) in enumerate(self.splits):
             found = self.fit(structure, step, fold)
             converged &= found.converged
-            shares += [roll(found.vector, motion, (self.horizon,)).shares for motion in out]
+            rolled = [roll(found.vector, motion, (self.horizon,)).shares for motion in out]
+            shares += [share for share in rolled if np.isfinite(share[:, -1]).any()]  # not of what is too short
         parts = np.array([np.nanmean(share[:, -1] ** 2) for share in shares])
         error = math.sqrt(float(parts.mean()))
         deviation = float(parts.std(ddof=1)) / math.sqrt(len(parts)) / (2.0 * error) if len(parts) > 1 else math.inf

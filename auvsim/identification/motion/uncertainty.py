@@ -25,7 +25,7 @@ from estimators.planar.terms import LABELS, Structure
 
 PROBABILITY = 0.95
 ROUND = 0.1  # share of a position's whole variance that each direction has at least
-BETWEEN = 0.5  # standard deviations among records by which bands are wider than on the mean of them
+BETWEEN = 1.0  # standard deviations among records by which bands are wider than on the mean of them
 CONSTANTS = tuple(LABELS.index(f"{axis} 1") for axis in ("surge", "sway", "yaw"))
 _SEEN = (0, 1, 2)  # of the state: position and heading say what the process does between sensors
 _SHORTEST = 20.0  # of a half of a record [s]
