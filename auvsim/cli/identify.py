@@ -4,6 +4,7 @@ import re
 import sys
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from rich import box
 from rich.console import Console
@@ -20,6 +21,7 @@ from auvsim.identification.motion.dimensions import Dimensions
 from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
 from auvsim.identification.pipeline import STEPS, Identification, identify
 from auvsim.identification.readers import models, read
+from auvsim.identification.records import Readings
 from auvsim.physics import planar_sets
 
 PARAMETERS = "parameters.yaml"
@@ -69,7 +71,8 @@ def run(
                 )
             if not steps:
                 named = "vehicle" if vehicle is None else _stem(vehicle)
-                motion = identify_motion(readings, judging, name=named, hull=known, quick=quick, progress=progress)
+                given = {"name": named, "hull": known, "quick": quick, "progress": progress}
+                motion = _motion(readings, judging, given, alone=planar is None)
         if motion is not None:
             written += _write_motion(motion, out, alone=planar is None)
             show_motion(motion)
@@ -78,6 +81,19 @@ def run(
             show(planar)
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
+
+
+def _motion(
+    readings: Readings, judging: Readings | None, given: dict[str, Any], *, alone: bool
+) -> MotionIdentification | None:
+    """The motion model; None, which is told, where a known vehicle's data are enough for its planar model alone."""
+    try:
+        return identify_motion(readings, judging, **given)
+    except InputError as error:
+        if alone:
+            raise
+        print(f"no motion model of another structure: {error}", file=sys.stderr)
+        return None
 
 
 def _hull(given: Sequence[float | None]) -> Dimensions | None:

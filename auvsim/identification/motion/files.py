@@ -98,8 +98,11 @@ def motion_model(found: MotionIdentification) -> MotionModel:
 
 
 def _noise(found: MotionIdentification) -> Array:
-    """Densities (3,) of white noise that spreads predictions as the band's white and constant parts do."""
-    constant = found.spread.constant**2 * found.choice.horizon / 3.0  # of velocity after a third of it, on average
+    """Densities (3,) of white noise that spreads positions after the horizon as the white and constant parts do.
+
+    A constant acceleration b moves by b T^2 / 2, white noise of density q by a variance of q T^3 / 3.
+    """
+    constant = 0.75 * found.spread.constant**2 * found.choice.horizon
     factor = float(np.interp(found.choice.horizon, found.spread.horizons, found.spread.factors))
     return factor * (found.spread.noise + constant)
 
