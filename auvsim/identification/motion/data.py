@@ -82,26 +82,20 @@ def _coarser(record: Record, coarsest: float) -> Record:
         return record
     count = (len(record.times) - 1) // width
     inputs = record.inputs[: count * width].reshape(count, width, -1).mean(axis=1)
-    offsets = np.arange(width) - (width - 1) // 2
-    # Of an even width the middle lies half a sample late, so both ends count half.
-    weights = np.ones(width)
-    if width % 2 == 0:
-        offsets, weights = np.arange(width + 1) - width // 2, np.array([0.5, *np.ones(width - 1), 0.5])
-    places = width * np.arange(count)[:, None] + offsets
+    places = width * np.arange(count)[:, None] + np.arange(width) - (width - 1) // 2
     inside = (places >= 0) & (places < len(record.times))
     values = record.measured[np.clip(places, 0, len(record.times) - 1)]
     there = np.isfinite(values) & inside[..., None]
-    shares = weights[:, None] * there
-    # A slope within the mean would move it where samples are missing on one side: those are moved by the local slope.
-    total = shares.sum(axis=1)
-    means = (shares * np.where(there, values, 0.0)).sum(axis=1) / np.where(total > 0.0, total, 1.0)
-    off = (shares * offsets[:, None]).sum(axis=1) / np.where(total > 0.0, total, 1.0)
-    measured = np.where(total > 0.0, means, np.nan)
+    total = there.sum(axis=1)
+    some = np.maximum(total, 1)
+    measured = np.where(total > 0, np.where(there, values, 0.0).sum(axis=1) / some, np.nan)
+    # A mean of samples that do not lie evenly about the time is moved there by the local slope.
+    times = (there * places[..., None]).sum(axis=1) / some
     for c in range(measured.shape[1]):
-        seen = np.flatnonzero(np.isfinite(measured[:, c]))
-        if len(seen) > 2 and np.any(off[seen, c]):
-            slope = np.gradient(measured[seen, c], width * seen + off[seen, c])
-            measured[seen, c] -= slope * off[seen, c]
+        seen = np.flatnonzero(total[:, c])
+        if len(seen) > 2:
+            slope = np.gradient(measured[seen, c], times[seen, c])
+            measured[seen, c] += slope * (width * seen - times[seen, c])
     dense = np.array([np.median(total[total[:, c] > 0, c]) if (total[:, c] > 0).any() else 1.0 for c in range(8)])
     return replace(
         record,
