@@ -287,12 +287,20 @@ def test_no_baseline_is_better_on_the_whole() -> None:
 
 
 def test_the_report_begins_with_trust(found: MotionIdentification) -> None:
-    """The first verdict says how far to trust the model, with its numbers."""
-    good, text = verdicts(found)[0]
-    assert good
+    """The first verdict says how far to trust the model, with its numbers; what is no good is said there too."""
+    at, k = found.judged, found.place
+    _, text = verdicts(found)[0]
     assert text == found.trust
-    assert f"{found.judged.share[found.place]:.1%} of the distance run after 60 s" in text
+    assert f"{at.share[k]:.1%} of the distance run after 60 s" in text
     assert any("later than positions" in said for _, said in verdicts(found))
+    for inside, share, said, good in (
+        (0.95, at.share, "open loop", True), (0.5, at.share, "trust its error, not its band", False),
+        (0.95, found.none, "do not trust it", False),
+    ):  # fmt: skip
+        judged = replace(at, inside=np.full(len(at.horizons), inside), share=share)
+        other = replace(found, holdout=judged)
+        assert verdicts(other)[0][0] is good
+        assert verdicts(other)[0][1].startswith(said)
 
 
 def test_a_model_is_read_as_it_was_written(found: MotionIdentification, tmp_path: Path) -> None:
@@ -360,7 +368,7 @@ def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, caps
     arguments = ["identify", *map(str, logs[:3]), "--holdout", str(logs[3]), "--out", str(tmp_path / "o"), "--quick"]
     assert cli.main(arguments) == 0
     output = capsys.readouterr()
-    assert output.out.splitlines()[0][2:].startswith("open loop it is off by")
+    assert "open loop it is off by" in output.out.splitlines()[0]
     assert "no shaft speed" in output.out
     page = (tmp_path / "o" / "report.html").read_text()
     assert page.index("open loop it is off by") < page.index("Horizons")

@@ -57,6 +57,7 @@ class MotionFit:
     limits: Array  # (3,) of surge, sway and yaw rate [m/s, rad/s]
     converged: bool
     iterations: int
+    held: Array | None = None  # (k, k) the information if the nuisances were known; None: there are none
     worth: float = 1.0  # by what the information overstates the data, see ALIKE
 
     @property
@@ -223,7 +224,7 @@ def segments(
     return MotionFit(
         structure=structure, step=step, values=values, information=_without_nuisances(total, k),
         blocks=tuple(_blocks(problem, point)), deviations=deviations, currents=point.nuisances[:, :2],
-        limits=guess.limits, converged=converged, iterations=used, worth=worth,
+        limits=guess.limits, converged=converged, iterations=used, held=total[:k, :k], worth=worth,
     )  # fmt: skip
 
 
@@ -262,13 +263,15 @@ def covariance(fit: MotionFit) -> Array:
     that are neither white nor of the size believed. Where stretches are few it is no smaller than that of the weighted
     least squares itself.
     """
-    H = fit.information
+    H = fit.information if fit.held is None else fit.held
+    # What the currents of the records leave unknown besides: they are eliminated from all stretches at once.
+    wider = np.sqrt(np.diag(invert(fit.information)) / np.diag(invert(H)))
     moves = []
     for part, gradient in fit.blocks:
         if np.any(gradient):
             moves.append(-invert(H - part) @ gradient)
     if len(moves) < 3:
-        return invert(H)
+        return invert(fit.information)
     away = np.array(moves)
     count = len(away)
     spread = (count - 1) / count * (away - away.mean(axis=0)).T @ (away - away.mean(axis=0))
@@ -276,4 +279,4 @@ def covariance(fit: MotionFit) -> Array:
     size = np.sqrt(np.diag(H))
     inflation = max(1.0, float(np.mean(np.diag(spread) * np.diag(H))) / float(np.mean(np.diag(invert(H)) * size**2)))
     share = min(0.5, len(H) / (2.0 * count))
-    return (1.0 - share) * spread + share * inflation * invert(H)
+    return np.outer(wider, wider) * ((1.0 - share) * spread + share * inflation * invert(H))

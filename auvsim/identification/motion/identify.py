@@ -22,6 +22,7 @@ from estimators.planar.terms import AXES, PLANAR, TermsProcess, planar_parameter
 LEAST = 40.0  # of data in all [s]
 STILL = math.radians(0.3)  # a rudder that moves less than this excites nothing [rad]
 APART = 1.5  # rms of the scores of disjoint halves beyond which intervals do not hold
+HOLDS = 0.85  # of held-out positions inside a 95 % band, below which the band is not to be trusted
 MARGIN = 0.05  # by which a model must be better than none to be worth a file
 
 
@@ -76,6 +77,8 @@ class MotionIdentification:
         at, k = self.judged, self.place
         source = "held out" if self.holdout is not None else "left out of the fits"
         low = "" if self.better else "do not trust it: no better than a vehicle that goes on as it began; "
+        if self.better and at.inside[k] < HOLDS:
+            low = "trust its error, not its band, for what was held out is unlike what was fitted; "
         u, v, r = self.fit.limits / fit.BEYOND
         return (
             f"{low}open loop it is off by {at.share[k]:.1%} of the distance run after {at.horizons[k]:.0f} s (rms "
@@ -187,7 +190,8 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
     """What the data say, whether it is good, the most important first."""
     chosen = found.choice.chosen
     best = found.choice.candidates[0]
-    said = [(found.better, found.trust)]
+    holds = bool(found.judged.inside[found.place] >= HOLDS)
+    said = [(found.better and holds, found.trust)]
     text = f"chosen: {chosen.structure.name} by {chosen.step} ({len(chosen.structure.terms)} terms)"
     if best is not chosen:
         text += f"; {best.structure.name} by {best.step} is no better by more than chance ({best.error:.2%} against "
