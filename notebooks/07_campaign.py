@@ -25,9 +25,9 @@ from pathlib import Path
 import numpy as np
 from IPython.display import IFrame
 
+from auvsim import run, summarise
 from auvsim.campaign import execution, local, plan, report, statistics, table
-from auvsim.missions.docking import metrics
-from auvsim.simulation import scenario, trial
+from auvsim.simulation import scenario
 
 # %% [markdown]
 # ## The plan
@@ -43,8 +43,8 @@ document = {
         "current": {"kind": "uniform", "speed": {"uniform": [0.0, 0.5]}, "direction_deg": {"uniform": [-180.0, 180.0]}}
     },
     "variants": {
-        "augmented_ekf": {"estimator": {"factory": "augmented_ekf"}},
-        "paper": {"estimator": {"factory": "paper"}},
+        "augmented_ekf": {"estimator": {"kind": "augmented_ekf"}},
+        "paper": {"estimator": {"kind": "paper"}},
     },
 }
 chosen = plan.parse(document)
@@ -78,17 +78,17 @@ for row in rows:
 # Six trials leave wide intervals, and say so. Differences are taken trial by trial, since both variants met the same water: that is what makes a few trials tell much.
 
 # %%
-for rate in statistics.rates(rows, chosen.variants):
+for rate in statistics.rates(rows, chosen.variants, chosen.layout):
     print(
         f"{rate.variant:<14} {rate.quantity:<13} {rate.successes} of {rate.trials}, 95 % interval {rate.low:.0%} to {rate.high:.0%}"
     )
 
 # %%
-for d in statistics.differences(rows, chosen.variants):
+for d in statistics.differences(rows, chosen.variants, chosen.layout):
     print(f"{d.variant} less {chosen.variants[0]}: {d.quantity:<15} {d.value:+8.3f}  ({d.low:+.3f} to {d.high:+.3f})")
 
 # %%
-for nees in statistics.consistency(rows, chosen.variants):
+for nees in statistics.consistency(rows, chosen.variants, chosen.layout):
     if nees.phase == "all":
         print(
             f"{nees.variant:<14} NEES per axis {nees.mean:6.2f}, of a consistent filter {nees.low:.2f} to {nees.high:.2f}"
@@ -102,10 +102,9 @@ for nees in statistics.consistency(rows, chosen.variants):
 
 # %%
 worst = max(rows, key=lambda row: row["miss_distance"] or 0.0)
-again = trial.run_trial(
-    scenario.parse(chosen.values(worst["variant"], worst["trial"])), seed=worst["seed"], trial=worst["trial"]
-)
-same = metrics.summarise(again).miss_distance == worst["miss_distance"]
+definite = scenario.parse(chosen.values(worst["variant"], worst["trial"]))
+again = run(definite, seed=worst["seed"], trial=worst["trial"])
+same = summarise(again.vehicle())["miss_distance"] == worst["miss_distance"]
 print(worst["command"])
 print(f"the same to the last bit: {same}")
 

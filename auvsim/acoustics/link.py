@@ -2,13 +2,12 @@
 
 import heapq
 import math
-from dataclasses import dataclass
 
 from numpy.random import Generator
 from pydantic import Field, model_validator
 
+from auvsim.acoustics.message import Delivery, Fate, Message
 from auvsim.base.randomness import Noise
-from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
 
 
@@ -35,46 +34,40 @@ class AcousticSettings(Settings):
         return self
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Packet:
-    """What became of one reading that was sent."""
-
-    reading: Reading  # as delivered: stamp by the dock's clock, received at the (first) arrival or NaN if lost
-    lost: bool
-
-
 class Channel:
-    """A queue of packets on their way; each takes 5 uniforms, whether it is lost or not."""
+    """A queue of messages in transit to one receiver; each takes 5 uniforms, whether it is lost or not."""
 
     def __init__(self, settings: AcousticSettings, generator: Generator) -> None:
         self._settings = settings
         self._noise = Noise(generator)
-        self._queue: list[tuple[float, int, Reading]] = []
+        self._queue: list[tuple[float, int, Message]] = []
         self._count = 0  # breaks ties of arrival in the order sent
 
-    def send(self, reading: Reading, slant_range: float, *, lost: bool = False) -> Packet:
-        """Sends a reading at its stamp over a distance [m]; `lost` marks what was never there to send."""
-        settings = self._settings
+    def send(self, message: Message, slant_range: float, *, lost: bool = False) -> Fate:
+        """Sends a message over a distance [m]; `lost`: never sent, being out of reach."""
+        settings, to = self._settings, message.destination or ""
         drop, jitter, late, twice, gap = self._noise.uniforms(5)
-        stamp = reading.stamp + settings.clock_offset
-        if lost or drop < settings.dropout_probability:
-            return Packet(reading=reading._replace(stamp=stamp, received=math.nan), lost=True)
+        if lost:
+            return Fate(message, to, math.nan, "out of range")
+        if drop < settings.dropout_probability:
+            return Fate(message, to, math.nan, "dropped")
         delay = settings.delay + settings.per_metre * slant_range + settings.jitter * (2.0 * jitter - 1.0)
         if late < settings.late_probability:
             delay += settings.late_delay
-        sent = reading._replace(stamp=stamp, received=reading.stamp + delay)
-        self._push(sent)
+        received = message.sent + delay
+        self._push(received, message)
         if twice < settings.duplicate_probability:  # the copy follows within one late_delay
-            self._push(sent._replace(received=sent.received + gap * settings.late_delay))
-        return Packet(reading=sent, lost=False)
+            self._push(received + gap * settings.late_delay, message)
+        return Fate(message, to, received, "delivered")
 
-    def receive(self, now: float) -> list[Reading]:
-        """Takes the readings that have arrived by now [s] out of the queue, in order of arrival."""
+    def receive(self, now: float) -> list[Delivery]:
+        """Takes the messages that have arrived by now [s] out of the queue, in order of arrival."""
         arrived = []
         while self._queue and self._queue[0][0] <= now:
-            arrived.append(heapq.heappop(self._queue)[2])
+            received, _, message = heapq.heappop(self._queue)
+            arrived.append(Delivery(message, received))
         return arrived
 
-    def _push(self, reading: Reading) -> None:
-        heapq.heappush(self._queue, (reading.received, self._count, reading))
+    def _push(self, received: float, message: Message) -> None:
+        heapq.heappush(self._queue, (received, self._count, message))
         self._count += 1

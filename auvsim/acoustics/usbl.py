@@ -6,21 +6,26 @@ ticks, so the vehicle is interpolated to the time of each ping.
 
 import math
 from bisect import bisect_right
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import ClassVar
 
 import numpy as np
 from numpy.random import Generator
 from pydantic import Field, field_validator, model_validator
 
+from auvsim.acoustics.message import Message, UsblPacket
 from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.interpolation import cubic_hermite
 from auvsim.base.randomness import Noise
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
-from auvsim.physics.truth import DockPose, Truth
+from auvsim.data.variables import Variable
+from auvsim.physics.truth import StructurePose, Truth
 
 Vector = tuple[float, float, float]
+BITS = 8 * 16  # of a packet: seven numbers of 16 bits and the dock's state
 
 
 class UsblSettings(Settings):
@@ -29,6 +34,9 @@ class UsblSettings(Settings):
     The noise table is the square root of the USBL variances in table 1 of Qiu & Li 2019.
     """
 
+    dock: str | None = Field(
+        default=None, description="structure that serves the vehicle; none: its mission's dock, or the only one"
+    )
     interval: float = Field(default=5.0, gt=0.0, description="mean time from ping to ping; the first is random [s]")
     jitter: float = Field(default=1.0, ge=0.0, description="half width of the interval's uniform distribution [s]")
     near_range: float | None = Field(default=None, gt=0.0, description="range below which to ping faster [m]")
@@ -70,15 +78,32 @@ class UsblSettings(Settings):
             raise ValueError(f"outlier_maximum must be at least outlier_minimum, {self.outlier_minimum} m")
         return self
 
+    def sigma(self, slant_range: float) -> float:
+        """Standard deviation per axis [m] at a range [m]: log-log in the table, constant beyond its ends."""
+        ranges, sigmas = ([math.log(number) for number in column] for column in zip(*self.noise, strict=True))
+        x = math.log(slant_range) if slant_range > 0.0 else -math.inf
+        if x <= ranges[0]:
+            return self.noise_scale * math.exp(sigmas[0])
+        if x >= ranges[-1]:
+            return self.noise_scale * math.exp(sigmas[-1])
+        index = bisect_right(ranges, x) - 1
+        fraction = (x - ranges[index]) / (ranges[index + 1] - ranges[index])
+        return self.noise_scale * math.exp(sigmas[index] + fraction * (sigmas[index + 1] - sigmas[index]))
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Ping:
     """One measurement by the dock, before it is sent."""
 
-    reading: Reading  # stamped with the true time of the ping; received is NaN until a channel sets it
+    message: Message  # to the vehicle; with a `UsblPacket`
     slant_range: float  # true distance from transceiver to transponder [m]
     outlier: bool
     lost: bool  # out of range: there is nothing to send
+
+    @property
+    def reading(self) -> Reading:
+        """What the dock measured."""
+        return self.message.payload.reading
 
 
 class Usbl:
@@ -89,12 +114,45 @@ class Usbl:
     """
 
     name = "usbl"
+    value = Variable(
+        ("packet",),
+        "float64",
+        "m, rad",
+        "transponder x, y, z [m]; dock heading, pitch, roll [rad]; dock depth [m]",
+        "dock",
+    )
+    sizes: ClassVar = {"packet": 7}
+    columns: ClassVar = {
+        "lost": Variable((), "bool", "1", "whether the packet never arrived"),
+        "outlier": Variable((), "bool", "1", "whether the fix was drawn as an outlier"),
+    }
 
-    def __init__(self, settings: UsblSettings, generator: Generator, dock: DockPose) -> None:
+    def __init__(
+        self,
+        settings: UsblSettings,
+        generator: Generator,
+        dock: StructurePose,
+        *,
+        vehicle: str = "",
+        structure: str = "",
+        clock_offset: float = 0.0,
+        occupant: Callable[[], str | None] = lambda: None,
+    ) -> None:
+        """A USBL of a dock that serves one vehicle.
+
+        Args:
+            settings: timing, noise, lever arms.
+            generator: of its noise.
+            dock: where the dock truly is.
+            vehicle: name of the one that it serves.
+            structure: name of the dock.
+            clock_offset: dock's clock ahead of the vehicle's [s]; shifts the stamps.
+            occupant: says which vehicle the dock's latch holds now, if any.
+        """
         self._settings = settings
+        self.vehicle, self.structure = vehicle, structure
+        self._clock_offset, self._occupant = clock_offset, occupant
         self._noise = Noise(generator)
-        self._log_ranges = [math.log(row[0]) for row in settings.noise]
-        self._log_sigmas = [math.log(row[1]) for row in settings.noise]
         heading, pitch, roll, depth = self._noise.normals(4)
         heading_bias = math.radians(settings.dock_heading_bias_deg) * heading
         tilt_bias = math.radians(settings.dock_tilt_bias_deg)
@@ -105,7 +163,7 @@ class Usbl:
         )
         self._dock_depth = dock.depth + settings.dock_depth_bias * depth
         self._to_dock = rotation(dock.roll, dock.pitch, dock.heading).T
-        self._mouth = np.array((0.0, 0.0, dock.depth))
+        self._mouth = dock.position
         self._transceiver = np.array(settings.transceiver)
         self._transponder = np.array(settings.transponder)
         self._next = settings.interval * (1.0 - self._noise.uniforms(1)[0])  # phase in (0, interval]
@@ -126,19 +184,6 @@ class Usbl:
             pings.append(self._ping(previous, now))
         return pings
 
-    def sigma(self, slant_range: float) -> float:
-        """Standard deviation per axis [m] at a range [m]: log-log in the table, constant beyond its ends."""
-        ranges, sigmas = self._log_ranges, self._log_sigmas
-        scale = self._settings.noise_scale
-        x = math.log(slant_range) if slant_range > 0.0 else -math.inf
-        if x <= ranges[0]:
-            return scale * math.exp(sigmas[0])
-        if x >= ranges[-1]:
-            return scale * math.exp(sigmas[-1])
-        index = bisect_right(ranges, x) - 1
-        fraction = (x - ranges[index]) / (ranges[index + 1] - ranges[index])
-        return scale * math.exp(sigmas[index] + fraction * (sigmas[index + 1] - sigmas[index]))
-
     def _ping(self, previous: Truth, now: Truth) -> Ping:
         settings, time = self._settings, self._next
         position, turn = interpolate(previous, now, time)
@@ -146,7 +191,7 @@ class Usbl:
         slant_range = math.sqrt(float(relative @ relative))
         draws = self._noise.normals(7)
         chance, size, wait = self._noise.uniforms(3)
-        measured = relative + self.sigma(slant_range) * np.array(draws[:3])
+        measured = relative + settings.sigma(slant_range) * np.array(draws[:3])
         outlier = chance < settings.outlier_probability
         if outlier:
             direction = np.array(draws[3:6])  # a normalised normal vector is uniform on the sphere
@@ -154,11 +199,12 @@ class Usbl:
             measured += size / math.sqrt(float(direction @ direction)) * direction
         depth = self._dock_depth + settings.dock_depth_noise * draws[6]
         value = np.array((*measured.tolist(), *self._dock_attitude, depth))
-        reading = Reading("usbl", time, math.nan, value, self._sequence)
+        reading = Reading("usbl", time + self._clock_offset, math.nan, value, self._sequence)
+        message = Message(self.structure, self.vehicle, time, "usbl", UsblPacket(reading, self._occupant()), BITS)
         self._sequence += 1
         self._next = time + self._wait(slant_range, wait)
         lost = settings.maximum_range is not None and slant_range > settings.maximum_range
-        return Ping(reading=reading, slant_range=slant_range, outlier=outlier, lost=lost)
+        return Ping(message=message, slant_range=slant_range, outlier=outlier, lost=lost)
 
     def _wait(self, slant_range: float, draw: float) -> float:
         settings = self._settings

@@ -1,7 +1,6 @@
 """The picture of a manoeuvre, from its log alone: track, heading, rudder, yaw rate and surge, true and measured."""
 
 import os
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,16 +8,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
-from auvsim.analysis.style import DOCK, WATER, dress, legend
+from auvsim.analysis.style import DOCK, SIZE, WATER, dress, legend, save
 from auvsim.base.errors import InputError
-from auvsim.base.files import whole
-from auvsim.data.log import TrialLog
+from auvsim.data.log import VehicleLog
 from auvsim.missions.docking.dock_frame import to_body
 from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 from auvsim.missions.manoeuvres.settings import SpiralSettings
 
-SIZE = (14.0, 9.0)  # [in]
-DPI = 110
 TRUTH: dict[str, Any] = {"color": "#1a1a1a", "lw": 1.2, "label": "true"}
 MEASURED: dict[str, Any] = {"color": "#4c72b0", "ls": "", "marker": ".", "ms": 2.0, "alpha": 0.5, "label": "measured"}
 COMMAND: dict[str, Any] = {"color": "#c44e52", "lw": 1.2, "label": "commanded"}
@@ -29,21 +25,16 @@ HEADLINES = {  # figures that stand in the title
 }
 
 
-def manoeuvre(log: TrialLog, path: str | os.PathLike[str]) -> None:
+def manoeuvre(log: VehicleLog, path: str | os.PathLike[str]) -> None:
     """Writes the picture of a manoeuvre (PNG).
 
     Raises:
-        InputError: the log is that of a docking trial or holds nothing, or the file cannot be written.
+        InputError: the vehicle did something else, the log holds nothing, or the file cannot be written.
     """
-    figure = manoeuvre_figure(log)
-    try:
-        with whole(Path(path)) as partial:
-            figure.savefig(partial, dpi=DPI, format="png")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
+    save(manoeuvre_figure(log), path)
 
 
-def manoeuvre_figure(log: TrialLog) -> Figure:
+def manoeuvre_figure(log: VehicleLog) -> Figure:
     """The figure that `manoeuvre` writes."""
     parts = manoeuvre_metrics.parts(log)
     if not len(log["truth"]["time"]):
@@ -71,7 +62,7 @@ def manoeuvre_figure(log: TrialLog) -> Figure:
     return figure
 
 
-def _headline(log: TrialLog) -> str:
+def _headline(log: VehicleLog) -> str:
     told = []
     for found in manoeuvre_metrics.figures(log):
         numbers = {key: found.numbers.get(key) for key in HEADLINES.get(found.kind, ())}
@@ -81,10 +72,11 @@ def _headline(log: TrialLog) -> str:
             if value is not None
         )
         told.append(f"{found.kind}: {text}" if text else found.kind)
-    return f"Seed {log.attributes['seed']}, trial {log.attributes['trial']}: {'; '.join(told) or 'approach only'}"
+    run = log.log.attributes
+    return f"Seed {run['seed']}, trial {run['trial']}: {'; '.join(told) or 'approach only'}"
 
 
-def _track(axes: Axes, log: TrialLog) -> None:
+def _track(axes: Axes, log: VehicleLog) -> None:
     """The track from its start, over ground and, where there is a current, through the water."""
     truth = log["truth"]
     place = truth["position"][:, :2] - truth["position"][:1, :2]
@@ -103,7 +95,7 @@ def _track(axes: Axes, log: TrialLog) -> None:
     axes.legend(loc="best", fontsize=9.5)
 
 
-def _spirals(axes: Axes, log: TrialLog) -> None:
+def _spirals(axes: Axes, log: VehicleLog) -> None:
     for start, settings in manoeuvre_metrics.parts(log):
         if not isinstance(settings, SpiralSettings):
             continue
@@ -117,33 +109,33 @@ def _spirals(axes: Axes, log: TrialLog) -> None:
     axes.legend(loc="best", fontsize=9.5)
 
 
-def _heading(axes: Axes, log: TrialLog) -> None:
-    truth, compass, guidance = log["truth"], log["compass"], log["guidance"]
+def _heading(axes: Axes, log: VehicleLog) -> None:
+    truth, compass, mission = log["truth"], log["compass"], log["mission"]
     heading = np.unwrap(truth["attitude"][:, 2])
     measured = np.unwrap(np.concatenate([heading[:1], compass["value"][:, 0]]))[1:]  # in the turn of the truth
     axes.plot(compass["time"], np.degrees(measured), **MEASURED)
     axes.plot(truth["time"], np.degrees(heading), **TRUTH)
-    course = np.degrees(guidance["heading_command"])
-    near = np.interp(guidance["time"], truth["time"], np.degrees(heading))
-    axes.plot(guidance["time"], course + 360.0 * np.round((near - course) / 360.0), **COMMAND)
+    course = np.degrees(mission["heading_setpoint"])
+    near = np.interp(mission["time"], truth["time"], np.degrees(heading))
+    axes.plot(mission["time"], course + 360.0 * np.round((near - course) / 360.0), **COMMAND)
 
 
-def _rudder(axes: Axes, log: TrialLog) -> None:
+def _rudder(axes: Axes, log: VehicleLog) -> None:
     command = log["command"]
     axes.step(command["time"], np.degrees(command["rudder"]), where="post", **COMMAND)
 
 
-def _yaw_rate(axes: Axes, log: TrialLog) -> None:
+def _yaw_rate(axes: Axes, log: VehicleLog) -> None:
     truth, gyro = log["truth"], log["gyro"]
     axes.plot(gyro["time"], np.degrees(gyro["value"][:, 2]), **MEASURED)
     axes.plot(truth["time"], np.degrees(truth["nu"][:, 5]), **TRUTH)
 
 
-def _surge(axes: Axes, log: TrialLog) -> None:
-    truth, dvl, guidance = log["truth"], log["dvl"], log["guidance"]
+def _surge(axes: Axes, log: VehicleLog) -> None:
+    truth, dvl, mission = log["truth"], log["dvl"], log["mission"]
     through = truth["nu"][:, :3] - to_body(truth["quaternion"], truth["current"])
     axes.plot(dvl["time"], dvl["value"][:, 3], **MEASURED)
     axes.plot(truth["time"], through[:, 0], **TRUTH)
-    axes.step(guidance["time"], guidance["speed_command"], where="post", **COMMAND)
-    spread = np.concatenate([through[:, 0], guidance["speed_command"]])
+    axes.step(mission["time"], mission["speed_setpoint"], where="post", **COMMAND)
+    spread = np.concatenate([through[:, 0], mission["speed_setpoint"]])
     axes.set(ylim=(spread.min() - 0.15, spread.max() + 0.15))  # room for the noise

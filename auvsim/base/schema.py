@@ -1,4 +1,4 @@
-"""What a class of settings says of itself: its dotted keys, its errors in one line, its text as commented YAML."""
+"""Dotted keys of a settings class, its errors in one line, and its text as commented YAML."""
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -11,37 +11,63 @@ from pydantic_core import to_jsonable_python
 
 from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
+from auvsim.base.settings import OwnPart, kinds
 
 WIDTH = 120  # columns of the commented YAML
 
 
+class UnknownKeyError(ValueError):
+    """Raised by a validator that found a key which its settings do not have.
+
+    Args:
+        key: that is unknown.
+        siblings: those that there are.
+        more: what else is right, appended to the suggestion.
+    """
+
+    def __init__(self, key: str, siblings: list[str], more: str = "") -> None:
+        super().__init__(f"unknown key {key}")
+        self.key, self.siblings, self.more = key, siblings, more
+
+
 def members(annotation: Any) -> list[type[BaseModel]]:
-    """The settings classes an annotation allows: several for a union told apart by `kind`, none for plain values."""
+    """The settings classes an annotation allows: several for a union discriminated by `kind`, none for plain values.
+
+    Of a mapping of names to settings, those of its values.
+    """
     if get_origin(annotation) is Annotated:
         return members(get_args(annotation)[0])
     if get_origin(annotation) in (Union, UnionType):
         return [model for argument in get_args(annotation) for model in members(argument)]
+    if get_origin(annotation) is dict:
+        return members(get_args(annotation)[1])
     return [annotation] if isinstance(annotation, type) and issubclass(annotation, BaseModel) else []
 
 
 def member(annotation: Any, value: Any) -> type[BaseModel] | None:
-    """The one settings class that `value` is meant for, if that can be told."""
-    models = members(annotation)
+    """The one settings class that `value` is meant for, if there is only one."""
+    models = [] if get_origin(annotation) is dict else members(annotation)
     if len(models) > 1 and isinstance(value, Mapping):
-        models = [model for model in models if value.get("kind") == model.model_fields["kind"].default]
+        kind = value.get("kind", models[0].model_fields["kind"].default)
+        own = [model for model in models if issubclass(model, OwnPart)] if ":" in str(kind) else []
+        models = own or [model for model in models if kind in kinds(model)]
     return models[0] if len(models) == 1 else None
 
 
 def keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
-    """Every dotted key below a settings class, those of all kinds included; items of lists have none."""
+    """Every dotted key below a settings class, those of all kinds included; items of lists have none.
+
+    In place of a name that the user chooses stands `*`.
+    """
     for name, field in model.model_fields.items():
         yield prefix + name
+        named = "*." if get_origin(field.annotation) is dict else ""
         for below in members(field.annotation):
-            yield from keys(below, f"{prefix}{name}.")
+            yield from keys(below, f"{prefix}{name}.{named}")
 
 
 def suggestion(key: str, model: type[BaseModel], siblings: list[str]) -> str:
-    """What the unknown dotted `key` may have meant: a like one beside it, or the same name elsewhere."""
+    """What the unknown dotted `key` may have meant: a similar one beside it, or the same name elsewhere."""
     *above, name = key.split(".")
     near = [".".join([*above, close]) for close in get_close_matches(name, siblings, n=1)]
     if not near:
@@ -72,7 +98,12 @@ def explain(error: ValidationError, model: type[BaseModel], values: Mapping, pla
     ]
     report = min(reports, key=lambda report: report["type"] != "extra_forbidden")
     path, owner, field = _locate(report["loc"], model, values)
-    text = _reason(report, path, model, owner, field)
+    cause = report.get("ctx", {}).get("error")
+    if isinstance(cause, UnknownKeyError):
+        path = f"{path}.{cause.key}"
+        text = f"unknown key; {suggestion(path, model, cause.siblings)}{cause.more}"
+    else:
+        text = _reason(report, path, model, owner, field)
     path, text = (path, text) if path else text.split(": ", 1) if ": " in text else ("", text)
     more = f" ({len(reports) - 1} more wrong)" if len(reports) > 1 else ""
     return InputError(": ".join(part for part in (place(path, places), path, text + more) if part))
@@ -92,18 +123,30 @@ def _locate(
     field: FieldInfo | None = None
     annotation: Any = model
     for part in location:
-        if isinstance(values, Mapping) and part not in values and values.get("kind") == part:
-            continue  # the tag of a union, not a key
+        if isinstance(values, Mapping) and part not in values and _is_tag(part, annotation, values):
+            continue
+        if part == "[key]":  # the name that the user chose is itself at fault
+            continue
         path.append(str(part))
         if isinstance(part, int):
             annotation = (get_args(annotation) or (None,))[0]
             values = values[part] if isinstance(values, list | tuple) and part < len(values) else None
+            continue
+        if get_origin(annotation) is dict:  # a name that the user chose
+            annotation = get_args(annotation)[1]
+            values = values.get(part) if isinstance(values, Mapping) else None
+            owner, field = None, None
             continue
         owner = member(annotation, values)
         field = owner.model_fields.get(part) if owner else None
         annotation = field.annotation if field else None
         values = values.get(part) if isinstance(values, Mapping) else None
     return ".".join(path), owner, field
+
+
+def _is_tag(part: Any, annotation: Any, values: Mapping) -> bool:
+    """Whether a part of pydantic's location is the tag of a union, not a key."""
+    return part == values.get("kind") or part in {model.__name__ for model in members(annotation)}
 
 
 def _reason(
@@ -117,13 +160,17 @@ def _reason(
         return f"not given{about}"
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         found = report.get("ctx", {}).get("tag")
-        tags = [option.model_fields["kind"].default for option in members(field.annotation)] if field else []
+        tags = [kind for option in members(field.annotation) for kind in kinds(option)] if field else []
+        if field and any(issubclass(option, OwnPart) for option in members(field.annotation)):
+            tags.append("package.module:Name of your own")
         return f"{f'no kind {found!r}' if found else 'kind is not given'}; there are {', '.join(tags)}"
     if kind == "value_error":
         return message.removeprefix("Value error, ")
     value = yaml_text.dump(report["input"], flow=True)
     value = value if len(value) <= 60 else value[:57] + "..."
-    return f"{value} {message.replace('Input should', 'should', 1).replace('be an object', 'be a mapping')}{about}"
+    for said, better in (("Input should", "should"), ("String should", "should"), ("be an object", "be a mapping")):
+        message = message.replace(said, better, 1)
+    return f"{value} {message}{about}"
 
 
 def place(path: str, places: Mapping[str, str]) -> str:
@@ -134,7 +181,7 @@ def place(path: str, places: Mapping[str, str]) -> str:
 
 def _section(model: type[BaseModel], values: Mapping, depth: int) -> Iterator[str]:
     indent = "  " * depth
-    for name, field in model.model_fields.items():
+    for name, field in sorted(model.model_fields.items(), key=lambda item: item[0] != "kind"):
         value = values[name] if name in values else _default(field)
         below = member(field.annotation, value)
         if below is None or not isinstance(value, Mapping) or not (value.keys() & below.model_fields.keys()):

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+from auvsim.analysis.statistics import wilson
 from auvsim.base.errors import InputError
 from auvsim.campaign import design, table, trials
 from auvsim.campaign.folder import Folder, Record, claimed
 from auvsim.campaign.local import Death, Pool
-from auvsim.campaign.plan import Plan
+from auvsim.campaign.plan import Plan, missions
 from auvsim.campaign.task import Result, Task
-from auvsim.missions.docking.metrics import wilson
 
 PREPARATION = 600.0  # in which everything must be set up and compiled once [s]
 
@@ -35,7 +35,7 @@ class Progress:
 
     done: int
     total: int  # at most, if there is a stopping rule
-    docked: int
+    successes: int
     errors: int  # that raised, died or hung
     rate: float  # trials a second of this run
     remaining: float  # until all are done [s]
@@ -84,7 +84,15 @@ def task(plan: Plan, variant: str, trial: int) -> Task:
     """One trial of a plan."""
     settings = plan.settings
     values = plan.values(variant, trial)
-    return Task(variant=variant, trial=trial, seed=settings.seed, values=values, keep=settings.keep)
+    return Task(
+        variant=variant,
+        trial=trial,
+        seed=settings.seed,
+        values=values,
+        missions=missions(values),
+        criterion=settings.success,
+        keep=settings.keep,
+    )
 
 
 def prepare(plan: Plan, engine: Engine) -> None:
@@ -150,7 +158,8 @@ class _Tally:
 
     def __init__(self, plan: Plan, progress: Callable[[Progress], None] | None) -> None:
         self._variants, self._trials, self._progress = plan.variants, plan.settings.trials, progress
-        self._docked = dict.fromkeys(plan.variants, 0)
+        self._criterion = plan.settings.success
+        self._successes = dict.fromkeys(plan.variants, 0)
         self._done = self._errors = self._here = 0
         self._started = time.monotonic()
 
@@ -175,7 +184,7 @@ class _Tally:
                 Progress(
                     done=self._done,
                     total=total,
-                    docked=sum(self._docked.values()),
+                    successes=sum(self._successes.values()),
                     errors=self._errors,
                     rate=rate,
                     remaining=(total - self._done) / rate,
@@ -184,13 +193,13 @@ class _Tally:
 
     def narrow(self, width: float, trials: int) -> bool:
         """Whether the interval of each variant's success rate over so many trials is narrower than that."""
-        intervals = [wilson(docked, trials) for docked in self._docked.values()]
+        intervals = [wilson(successes, trials) for successes in self._successes.values()]
         return all(high - low < width for low, high in intervals)
 
     def _count(self, record: Record) -> None:
         self._done += 1
         self._errors += record["error"] is not None
-        self._docked[record["variant"]] += record["summary"] is not None and record["summary"]["docked"]
+        self._successes[record["variant"]] += trials.succeeded(*table.parts(record), self._criterion)
 
 
 def _description(plan: Plan, engine: Engine) -> dict[str, Any]:

@@ -4,7 +4,7 @@ import itertools
 import json
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -15,8 +15,10 @@ import auvsim
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
-from auvsim.campaign import design
-from auvsim.simulation import sampling, scenario
+from auvsim.campaign import columns, design
+from auvsim.campaign.criterion import Criterion
+from auvsim.simulation import sampling, scenario, short
+from auvsim.vehicles import library
 
 SHIPPED = Path(auvsim.__file__).parent / "plans"
 ALONE = "all"  # name of the only variant of a plan that names none
@@ -35,10 +37,18 @@ class Stop(Settings):
 class PlanSettings(Settings):
     """A campaign: the same trials with each of several variants of a scenario."""
 
-    name: str = Field(default="campaign", description="what the report calls it")
+    name: str = Field(
+        default="campaign",
+        pattern=r"^[^./\\:\x00-\x1f][^/\\:\x00-\x1f]{0,99}$",
+        description="what the report and its folder in out/ call it; a name, not a path",
+    )
     seed: int = Field(default=0, ge=0, description="seed of every random number of every trial")
     trials: int = Field(default=100, ge=1, description="trials of each variant; at most, if there is a `stop`")
     stop: Stop | None = Field(default=None, description="when to stop earlier")
+    success: Criterion | None = Field(
+        default=None,
+        description="column that says it, or {metric, below or above}; by default docked or finished of the mission",
+    )
     sampling: design.Sampling = Field(
         default="independent", description="how trials are drawn: independent, latin_hypercube or sobol"
     )
@@ -59,8 +69,10 @@ class PlanSettings(Settings):
 class Plan:
     """A plan that was read and checked."""
 
-    settings: PlanSettings  # `base` is whole: every key of a scenario
+    settings: PlanSettings  # `base` is whole: every key of a short scenario, or a scenario in full
     places: Mapping[str, str] = field(default_factory=dict, compare=False)  # where each dotted key was given
+    kinds: tuple[str, ...] = ("docking",)  # of the missions
+    fleet: bool = False  # whether there are several vehicles
 
     @cached_property
     def variants(self) -> tuple[str, ...]:
@@ -89,6 +101,11 @@ class Plan:
         return tuple(key for key in dict.fromkeys(pinned) if key and key not in self.drawn)
 
     @cached_property
+    def layout(self) -> columns.Layout:
+        """The columns of its table."""
+        return columns.layout(self.kinds, self.fleet, self.settings.success)
+
+    @cached_property
     def strata(self) -> int:
         """Trials that are stratified together."""
         return self.settings.stop.block if self.settings.stop else self.settings.trials
@@ -112,7 +129,7 @@ class Plan:
 
     def identity(self) -> dict:
         """What makes its trials what they are; a campaign goes on only with a plan of the same."""
-        values = self.settings.model_dump(mode="json", exclude={"name", "trials", "stop", "timeout", "keep"})
+        values = self.settings.model_dump(mode="json", exclude={"name", "trials", "stop", "success", "timeout", "keep"})
         return values | ({"strata": self.strata} if self.settings.sampling == "latin_hypercube" else {})
 
     def to_yaml(self) -> str:
@@ -169,12 +186,44 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Plan:
         settings = PlanSettings.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
         raise schema.explain(error, PlanSettings, values, places) from None
+    settings = _renewed(settings)
     _check_names(settings, places)
-    whole = sampling.merge(sampling.default_plan(), settings.base)
-    plan = Plan(settings.model_copy(update={"base": whole}), places)
+    if "vehicles" not in settings.base:  # the short form, of which a file gives only what is to differ
+        whole = sampling.merge(_default(settings.base), settings.base)
+        settings = settings.model_copy(update={"base": whole})
+    plan = Plan(settings, places)
     _check_counts(plan)
-    _check_trials(plan)
-    return plan
+    return _checked(plan)
+
+
+def _default(base: Mapping) -> dict:
+    """What a short scenario is given on top of: that of `auvsim manoeuvre` for one, else that of `auvsim dock`."""
+    manoeuvre = base.get("manoeuvre")
+    kind = manoeuvre.get("kind") if isinstance(manoeuvre, Mapping) else None
+    return sampling.manoeuvre_plan(kind) if isinstance(kind, str) else sampling.default_plan()
+
+
+def missions(values: Mapping) -> dict[str, str]:
+    """The kind of each vehicle's mission, by the vehicle's name, from the definite values of a scenario.
+
+    Raises:
+        InputError: There is no such vehicle.
+    """
+    if "vehicles" in values:
+        return {
+            name: (vehicle.get("mission") or {}).get("kind", "docking") for name, vehicle in values["vehicles"].items()
+        }
+    given = "docking" if values.get("manoeuvre") is None else "manoeuvre"
+    kind = given if values.get("mission") is None else values["mission"].get("kind", "docking")
+    return {library.model_name("vehicle", values["vehicle"]["model"]): kind}
+
+
+def _renewed(settings: PlanSettings) -> PlanSettings:
+    """Today's keys for those of earlier plans."""
+    old, new = "estimator.factory", "estimator.kind"
+    grid = {new if key == old else key: values for key, values in settings.grid.items()}
+    variants = {name: short.renewed(pins) for name, pins in settings.variants.items()}
+    return settings.model_copy(update={"grid": grid, "variants": variants})
 
 
 def _check_names(settings: PlanSettings, places: Mapping[str, str]) -> None:
@@ -204,15 +253,27 @@ def _check_counts(plan: Plan) -> None:
             raise _wrong(key, f"{count} is no multiple of the {points} points of the grid; use {fitting}", plan.places)
 
 
-def _check_trials(plan: Plan) -> None:
+def _checked(plan: Plan) -> Plan:
+    """The plan with its missions, of which the first trials make sense."""
+    found: dict[str, None] = {}
+    fleet = False
     for variant in plan.variants:
         places = plan._places(variant)
         for cell in range(len(plan.cells)):
             sampling.check(plan._distributed(variant, cell), places)
         for trial in range(min(plan.settings.trials, max(len(plan.cells), CHECKED))):
-            parsed = scenario.parse(plan.values(variant, trial), places)
-            if parsed.manoeuvre is not None:
-                raise _wrong("manoeuvre", "a campaign is of docking trials", places)
+            values = plan.values(variant, trial)
+            scenario.parse(values, places)
+            kinds = missions(values)
+            found |= dict.fromkeys(kinds.values())
+            fleet = fleet or len(kinds) > 1
+    plan = replace(plan, kinds=tuple(found), fleet=fleet)
+    try:
+        plan.layout  # noqa: B018 (whether there is one)
+    except InputError as error:
+        where = schema.place("success" if str(error).startswith("success") else "", plan.places)
+        raise InputError(f"{where}: {error}" if where else str(error)) from None
+    return plan
 
 
 def _wrong(key: str, text: str, places: Mapping[str, str]) -> InputError:

@@ -1,24 +1,22 @@
-"""What a campaign comes to: success rates, paired differences between variants, consistency of the estimators."""
+"""What a campaign comes to: success rates, paired differences between variants, consistency of the estimators.
 
-import math
-from collections.abc import Mapping, Sequence
+A trial is one sample, since its vehicles share current and noise: it had success if all of its vehicles had, and its
+numbers are the means over them.
+"""
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from statistics import fmean as mean
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from auvsim.base.frames import Array
-from auvsim.base.randomness import stream
-from auvsim.campaign.table import UNDER_WAY
-from auvsim.missions.docking.metrics import wilson
+from auvsim.analysis.statistics import bootstrap, newcombe, wilson
+from auvsim.campaign.columns import Layout
 from estimators.core.consistency import interval
 
 Row = Mapping[str, Any]  # of the table
 
-RATES = ("docked", "docked_first")
-MEANS = ("miss_distance", "position_rms", "current_rms", "nees_per_dof", "contact_impulse", "time")
-RESAMPLES = 10_000
 CONFIDENCE = 0.95
 
 
@@ -27,7 +25,7 @@ class Rate:
     """How often something happened, with Wilson's interval."""
 
     variant: str
-    quantity: str  # of RATES
+    quantity: str  # of the layout's rates
     successes: int
     trials: int
     low: float
@@ -39,7 +37,7 @@ class Difference:
     """A quantity of a variant less that of the first variant, in the same trials."""
 
     variant: str
-    quantity: str  # of RATES or MEANS
+    quantity: str  # of the layout's rates or means
     value: float
     low: float
     high: float
@@ -63,43 +61,45 @@ class Nees:
         return self.low <= self.mean <= self.high
 
 
-def rates(rows: Sequence[Row], variants: Sequence[str]) -> list[Rate]:
-    """The success rates of each variant."""
+def rates(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Rate]:
+    """The success rates of each variant, over the trials in which the question arises for a vehicle."""
     found = []
     for variant in variants:
-        own = [row for row in rows if row["variant"] == variant]
-        for quantity in RATES:
-            successes = sum(bool(row[quantity]) for row in own)
-            low, high = wilson(successes, len(own), CONFIDENCE)
-            counts = {"successes": successes, "trials": len(own)}
+        own = by_trial(rows, variant).values()
+        for quantity in layout.rates:
+            answers = [answer for group in own if (answer := over(all, group, quantity)) is not None]
+            low, high = wilson(sum(answers), len(answers), CONFIDENCE)
+            counts = {"successes": sum(answers), "trials": len(answers)}
             found.append(Rate(variant=variant, quantity=quantity, **counts, low=low, high=high))
     return found
 
 
-def differences(rows: Sequence[Row], variants: Sequence[str]) -> list[Difference]:
+def differences(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Difference]:
     """Each variant less the first, over the trials in which both have the quantity; nothing where none has.
 
-    Means have percentile bootstrap intervals over the pairs (Efron & Tibshirani 1993, ch. 13). Rates have Newcombe's
-    (1998), since a bootstrap of pairs that are all alike would claim to be certain.
+    Means have BCa bootstrap intervals over the pairs (Efron 1987). Rates have Newcombe's (1998), since a
+    bootstrap of pairs that are all alike would claim to be certain.
     """
-    by_variant = {name: {row["trial"]: row for row in rows if row["variant"] == name} for name in variants}
-    reference, *others = by_variant
+    reference, *others = (by_trial(rows, name) for name in variants)
     found = []
-    for variant in others:
-        shared = sorted(by_variant[variant].keys() & by_variant[reference].keys())
-        pairs = [(by_variant[variant][trial], by_variant[reference][trial]) for trial in shared]
-        for quantity in (*RATES, *MEANS):
-            values = np.array([(a[quantity], b[quantity]) for a, b in pairs], dtype=float).reshape(-1, 2)  # None: NaN
+    for variant, trials in zip(variants[1:], others, strict=True):
+        pairs = [(trials[trial], reference[trial]) for trial in sorted(trials.keys() & reference.keys())]
+        for quantity in (*layout.rates, *layout.means):
+            combined = all if quantity in layout.rates else mean
+            values = np.array([[over(combined, group, quantity) for group in pair] for pair in pairs], dtype=float)
+            values = values.reshape(-1, 2)  # None: NaN
             values = values[np.isfinite(values).all(axis=1)]
             if len(values):
                 less = values[:, 0] - values[:, 1]
-                low, high = _paired_rates(values > 0.5) if quantity in RATES else bootstrap(less)
+                low, high = (
+                    newcombe(values > 0.5, CONFIDENCE) if quantity in layout.rates else bootstrap(less, CONFIDENCE)
+                )
                 counted = {"value": float(less.mean()), "low": low, "high": high, "pairs": len(less)}
                 found.append(Difference(variant=variant, quantity=quantity, **counted))
     return found
 
 
-def consistency(rows: Sequence[Row], variants: Sequence[str]) -> list[Nees]:
+def consistency(rows: Sequence[Row], variants: Sequence[str], layout: Layout) -> list[Nees]:
     """NEES of each variant, in all phases together and in each.
 
     The errors along one trial hang together, so a trial counts as one sample of two degrees of freedom; as it holds
@@ -107,47 +107,27 @@ def consistency(rows: Sequence[Row], variants: Sequence[str]) -> list[Nees]:
     """
     found = []
     for variant in variants:
-        own = [row for row in rows if row["variant"] == variant]
-        for phase in ("all", *UNDER_WAY):
+        own = by_trial(rows, variant).values()
+        for phase in ("all", *layout.phases):
             key = "nees_per_dof" if phase == "all" else f"nees_per_dof_{phase}"
-            values = [row[key] for row in own if row[key] is not None]
+            values = [value for group in own if (value := over(mean, group, key)) is not None]
             if values:
                 low, high = (end / 2.0 for end in interval(2.0, len(values), CONFIDENCE))
-                mean = float(np.mean(values))
-                found.append(Nees(variant=variant, phase=phase, mean=mean, low=low, high=high, trials=len(values)))
+                average = float(np.mean(values))
+                found.append(Nees(variant=variant, phase=phase, mean=average, low=low, high=high, trials=len(values)))
     return found
 
 
-def bootstrap(values: Array) -> tuple[float, float]:
-    """Percentile interval of the mean of independent values (n,), the same each time."""
-    generator, n = stream(0, 0, "bootstrap"), len(values)
-    together = max(1, 2_000_000 // n)  # resamples in memory at a time
-    counts = [min(together, RESAMPLES - start) for start in range(0, RESAMPLES, together)]
-    means = [values[generator.integers(n, size=(count, n))].mean(axis=1) for count in counts]
-    tail = 0.5 * (1.0 - CONFIDENCE)
-    low, high = np.quantile(np.concatenate(means), [tail, 1.0 - tail])
-    return float(low), float(high)
+def by_trial(rows: Iterable[Row], variant: str) -> dict[int, list[Row]]:
+    """The vehicles of each trial of a variant."""
+    found: dict[int, list[Row]] = {}
+    for row in rows:
+        if row["variant"] == variant:
+            found.setdefault(row["trial"], []).append(row)
+    return found
 
 
-def _paired_rates(pairs: NDArray[np.bool_]) -> tuple[float, float]:
-    """Interval of the difference of two paired success rates (Newcombe 1998, Stat. Med. 17:2635, method 10).
-
-    Args:
-        pairs: (n, 2) whether each of the two succeeded.
-    """
-    first, second = pairs[:, 0], pairs[:, 1]
-    n = len(pairs)
-    both, only, other = (int(np.sum(x)) for x in (first & second, first & ~second, ~first & second))
-    neither = n - both - only - other
-    p, q = (both + only) / n, (both + other) / n
-    (p_low, p_high), (q_low, q_high) = wilson(both + only, n, CONFIDENCE), wilson(both + other, n, CONFIDENCE)
-    product = (both + only) * (other + neither) * (both + other) * (only + neither)
-    excess = both * neither - only * other
-    if excess > 0:  # his continuity correction
-        excess = max(excess - n / 2.0, 0.0)
-    phi = excess / math.sqrt(product) if product else 0.0
-
-    def reach(a: float, b: float) -> float:
-        return math.sqrt(max(a * a - 2.0 * phi * a * b + b * b, 0.0))
-
-    return p - q - reach(p - p_low, q_high - q), p - q + reach(p_high - p, q - q_low)
+def over(combined: Callable[[list[Any]], Any], vehicles: Iterable[Row], quantity: str) -> Any:
+    """A quantity of a trial, combined over its vehicles that have it; None if none has."""
+    values = [row[quantity] for row in vehicles if row.get(quantity) is not None]
+    return combined(values) if values else None

@@ -1,7 +1,5 @@
 """The command `auvsim`."""
 
-import contextlib
-import io
 import os
 import sys
 from collections.abc import Sequence
@@ -13,6 +11,8 @@ import tyro
 
 from auvsim import __version__
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.base.neighbours import check_estimators
+from auvsim.cli.parsing import parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
 
@@ -27,7 +27,7 @@ class Dock:
     """
 
     scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """What to pin, as YAML."""
+    """Keys that are not drawn from the seed, as YAML."""
     seed: int = 0
     """Seed of every random number."""
     trial: int = 0
@@ -35,17 +35,37 @@ class Dock:
     out: Path = Path("out")
     """Folder of trial.nc, summary.json, track.png, estimates.png and docking.mp4."""
     estimator: Annotated[str | None, tyro.conf.arg(metavar="NAME|PACKAGE.MODULE:FACTORY")] = None
-    """Estimator that navigates; the same as --estimator.factory."""
+    """Estimator that navigates; the same as --estimator.kind."""
     video: bool = True
     """Whether to draw docking.mp4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Run:
+    """Runs whatever a scenario says: one vehicle or several, docking, on a track or in manoeuvres.
+
+    Any key of the scenario is an option too, such as `--vehicles.auv_1.estimator.kind imm`. Exit codes as of
+    `auvsim dock`.
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
+    """The scenario, or the name of a shipped one (three_vehicles)."""
+    seed: int = 0
+    """Seed of every random number."""
+    trial: int = 0
+    """Number of the run under that seed."""
+    out: Path = Path("out")
+    """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several."""
+    video: bool = True
+    """Whether to draw run.mp4."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class Manoeuvre:
     """Runs manoeuvres of the vehicle, for its identification: KIND.nc and KIND.png each.
 
-    KIND is straight, circle, zigzag, multisine, prbs, spiral, optimal (designed to tell most of the vehicle), or table
-    and sequence, which need a file or an option that says of what. Any key of the scenario is an option too, such as
+    KIND is straight, circle, zigzag, multisine, prbs, spiral, optimal (designed to be most informative), or table
+    and sequence, which need a file or an option for their contents. Any key of the scenario is an option too, such as
     `--manoeuvre.heading_deg 20`.
     """
 
@@ -96,7 +116,7 @@ class ScenarioText:
     """Prints the full scenario as commented YAML: the default one, or what a file and options make of it."""
 
     scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """What to pin, as YAML."""
+    """Keys that are not drawn from the seed, as YAML."""
     default: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The default scenario as installed."""
 
@@ -105,7 +125,7 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    Prints the study with what it is to reach, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
     figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
     gives the same numbers, on however many cores.
     """
@@ -121,7 +141,7 @@ class Reproduce:
     jobs: int | None = None
     """Processes; by default one for each core."""
     truth: Literal["planar", "mujoco", "both"] | None = None
-    """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each; by
+    """True motion: of the paper's planar model, of the vehicle in MuJoCo, or one study of each; by
     default both, and in --quick planar."""
 
 
@@ -175,9 +195,9 @@ class Identify:
     out: Path = Path("out")
     """Folder of parameters.yaml, report.html and report.png."""
     holdout: tuple[Path, ...] = ()
-    """Logs to judge by; by default the kind of manoeuvre that teaches least."""
+    """Logs to judge by; by default the least informative kind of manoeuvre."""
     columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
-    """Which column is what, where names do not say: `rudder: {column: d, unit: deg, sign: -1}`."""
+    """Meaning of columns, where their names do not say it: `rudder: {column: d, unit: deg, sign: -1}`."""
     vehicle: str | None = None
     """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit of the planar model starts."""
     length: float | None = None
@@ -196,8 +216,14 @@ class Identify:
     """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class Study:
+    """Runs one of the studies behind the figures of the README; without a name lists them."""
+
+
 Command = (
     Dock
+    | Run
     | Campaign
     | Report
     | Manoeuvre
@@ -206,9 +232,10 @@ Command = (
     | Plot
     | Metrics
     | Reproduce
+    | Study
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
-TAKE_SCENARIO_KEYS = {"dock": Dock, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -231,12 +258,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    check_estimators()
+    if arguments[:1] == ["study"]:  # each study has options of its own
+        from auvsim.cli import study
+
+        return study.run(arguments[1:])
     values: dict = {}
     if arguments and arguments[0] in TAKE_SCENARIO_KEYS and not {"-h", "--help"} & set(arguments):
         from auvsim.cli import options
 
         arguments, values = options.split(arguments, TAKE_SCENARIO_KEYS[arguments[0]])
-    command = _parse(arguments)
+    command: Command = parse(Command, arguments, "auvsim", _DESCRIPTION)
     if isinstance(command, ScenarioText):
         from auvsim.cli import options
 
@@ -244,12 +276,25 @@ def _run(arguments: list[str]) -> int:
         return 0
 
     if isinstance(command, Dock):
-        from auvsim.cli import dock, options
+        from auvsim.cli import options, run
 
         scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
-        if scenario.manoeuvre is not None:
-            raise InputError(f"the scenario is a manoeuvre; run it with `auvsim manoeuvre {scenario.manoeuvre.kind}`")
-        return dock.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+        _, vehicle = scenario.lone
+        if vehicle.mission.kind != "docking":
+            manoeuvre = getattr(vehicle.mission, "manoeuvre", None)
+            meant = f"auvsim manoeuvre {manoeuvre.kind}" if manoeuvre else "auvsim run"
+            raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `{meant}`")
+        return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+
+    if isinstance(command, Run):
+        from auvsim.cli import options, run
+        from auvsim.simulation.loading import find
+
+        path = find(command.scenario)
+        scenario = options.scenario(path, None, values, command.seed, command.trial)
+        return run.run(
+            scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
+        )
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign
@@ -300,22 +345,10 @@ def _run(arguments: list[str]) -> int:
             )
         case Plot():
             return products.again(command.log, products.plots)
+        case Study():
+            raise AssertionError("handled above")
         case Metrics():
             return products.again(command.log, products.show_summary)
 
 
-def _parse(arguments: list[str]) -> Command:
-    """The command that the arguments name; tyro's boxed complaint becomes one line."""
-    complaint = io.StringIO()
-    try:
-        with contextlib.redirect_stderr(complaint):
-            return tyro.cli(Command, prog="auvsim", args=arguments, description=_DESCRIPTION)  # pyright: ignore
-    except SystemExit as leave:
-        if not leave.code:
-            raise
-        lines = [line.strip("│ ") for line in complaint.getvalue().splitlines()[1:]]
-        rule = next((index for index, line in enumerate(lines) if line.startswith("─")), len(lines))
-        raise InputError(f"{' '.join(lines[:rule]).rstrip('.')}; see auvsim --help") from None
-
-
-_DESCRIPTION = "Closed-loop docking trials of autonomous underwater vehicles. `auvsim --version` prints the version."
+_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles. `auvsim --version` prints the version."

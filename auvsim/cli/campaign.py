@@ -10,11 +10,11 @@ from rich.table import Table
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.campaign import cluster, execution, folder, local, plan, statistics, table
 from auvsim.campaign.folder import Folder
-from auvsim.cli import dock
+from auvsim.cli import run as running
 from auvsim.cli.report import CampaignProgress
 from auvsim.simulation import scenario
 
-SHOWN = ("variant", "trial", "error_type", *statistics.RATES, *statistics.MEANS)  # columns that the command needs
+HEADINGS = {"docked_first": "first attempt"}  # of rates that the table calls otherwise than their column
 WIDTH = 120  # of what is printed where there is no terminal [columns]
 OUT = Path("out")  # folders of campaigns lie in it, if --out does not say otherwise
 
@@ -48,7 +48,7 @@ def run(
 
 
 def replay(name: str, trial: int, *, variant: str | None, out: Path | None, video: bool) -> int:
-    """Runs one trial of a campaign as `auvsim dock` does, alone and from the same draws and noises.
+    """Runs one trial of a campaign as `auvsim run` does, alone and from the same draws and noises.
 
     Raises:
         InputError: For a plan, trial or variant that there is not.
@@ -65,7 +65,7 @@ def replay(name: str, trial: int, *, variant: str | None, out: Path | None, vide
     parsed = scenario.parse(chosen.values(variant, trial))
     here = Folder(Path(name), chosen).replay_path(variant, trial)
     path = out or (here if Path(name).is_dir() else OUT / f"{chosen.settings.name}-{variant}-{trial}")
-    code = dock.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
+    code = running.run(parsed, seed=chosen.settings.seed, trial=trial, out=path, video=video)
     print(f"written: {path}", file=sys.stderr)
     return code
 
@@ -96,19 +96,23 @@ def _report(done: Folder) -> None:
 
 def show(done: Folder) -> None:
     """Prints the rates of each variant and its differences from the first."""
-    variants = done.plan.variants
-    rows = [{key: row[key] for key in SHOWN} for row in table.rows(done)]  # of many trials all columns would be much
-    rates = {(rate.variant, rate.quantity): rate for rate in statistics.rates(rows, variants)}
-    less = {(d.variant, d.quantity): d for d in statistics.differences(rows, variants)}
-    found = Table(title=f"{done.plan.settings.name}: {len(rows)} docking trials, seed {done.plan.settings.seed}")
-    for heading in ("variant", "trials", "docked [%]", "first attempt [%]", "difference [points]", "errors"):
+    variants, layout = done.plan.variants, done.plan.layout
+    compared = "docked_first" if "docked_first" in layout.rates else layout.success
+    needed = ("variant", "trial", "error_type", *layout.rates)
+    rows = [{key: row[key] for key in needed} for row in table.rows(done)]  # of many trials all columns would be much
+    rates = {(rate.variant, rate.quantity): rate for rate in statistics.rates(rows, variants, layout)}
+    less = {(d.variant, d.quantity): d for d in statistics.differences(rows, variants, layout)}
+    count = len({(row["variant"], row["trial"]) for row in rows})
+    what = "docking trials" if layout.kinds == ("docking",) else "trials"
+    found = Table(title=f"{done.plan.settings.name}: {count} {what}, seed {done.plan.settings.seed}")
+    named = [f"{HEADINGS.get(quantity, quantity.replace('_', ' '))} [%]" for quantity in layout.rates]
+    for heading in ("variant", "trials", *named, "difference [points]", "errors"):
         found.add_column(heading, justify="left" if heading == "variant" else "right")
     for variant in variants:
-        docked = rates[variant, "docked"]
-        difference = less.get((variant, "docked_first"))
-        errors = sum(row["variant"] == variant and row["error_type"] is not None for row in rows)
-        shares = [_share(rates[variant, quantity]) for quantity in statistics.RATES]
-        found.add_row(variant, str(docked.trials), *shares, _less(difference), str(errors))
+        failed = {row["trial"] for row in rows if row["variant"] == variant and row["error_type"] is not None}
+        shares = [_share(rates[variant, quantity]) for quantity in layout.rates]
+        trials = str(rates[variant, layout.success].trials)
+        found.add_row(variant, trials, *shares, _less(less.get((variant, compared))), str(len(failed)))
     Console(markup=False, width=None if Console().is_terminal else WIDTH).print(found)
 
 

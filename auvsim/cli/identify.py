@@ -12,7 +12,7 @@ from rich.table import Table
 
 from auvsim.base.errors import InputError
 from auvsim.cli import report
-from auvsim.cli.dock import COMPILING, output_folder
+from auvsim.cli.run import COMPILING, output_folder
 from auvsim.identification import compiled, product
 from auvsim.identification import report as page
 from auvsim.identification.motion import engine, files

@@ -3,11 +3,12 @@
 import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from auvsim.base import schema
 from auvsim.base.errors import InputError, unknown_name
-from auvsim.cli import dock, options, products, report
-from auvsim.data.log import write
+from auvsim.cli import options, products, report
+from auvsim.cli import run as running
 from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings, OptimalSettings
 from auvsim.simulation import sampling
@@ -54,21 +55,20 @@ def _plan(kind: str, file: Path | None, values: Mapping, seed: int, trial: int) 
 def run(plans: Mapping[str, Scenario], *, seed: int, trial: int, out: Path) -> int:
     """Runs the manoeuvres, fills the folder and returns the exit code."""
     figures, code = [], 0
-    with dock.output_folder(out):
+    with running.output_folder(out):
         for kind, plan in _ready(plans, seed, trial).items():
-            log = dock.simulate(plan, seed, trial, kind)
             path = out / f"{kind}.nc"
-            write(log, path)
+            log = running.simulate(plan, seed, trial, kind, path)
             path.with_suffix(".png").unlink(missing_ok=True)  # of an earlier log
             if log.attributes["status"] == "interrupted":
                 print(f"auvsim: interrupted; {path} holds the manoeuvre up to there", file=sys.stderr)
                 return 130
             if log.attributes["status"] == "diverged":
-                print(f"auvsim: {dock.diagnosis(log)}; {path} holds the manoeuvre up to there", file=sys.stderr)
+                print(f"auvsim: {running.diagnosis(log)}; {path} holds the manoeuvre up to there", file=sys.stderr)
                 code = 1
                 continue
             products.plots(log, out)
-            figures += manoeuvre_metrics.figures(log)
+            figures += manoeuvre_metrics.figures(log.vehicle())
     if figures:
         report.manoeuvres(figures)
     return code
@@ -76,35 +76,41 @@ def run(plans: Mapping[str, Scenario], *, seed: int, trial: int, out: Path) -> i
 
 def _ready(plans: Mapping[str, Scenario], seed: int, trial: int) -> dict[str, Scenario]:
     """The same plans, each known to run, an optimal manoeuvre designed; nothing is written before."""
-    from auvsim.simulation.trial import Loop
+    from auvsim.simulation.run import Simulation
 
     for plan in plans.values():
-        if not isinstance(plan.manoeuvre, OptimalSettings):
-            Loop(plan, seed, trial)
+        if not isinstance(_manoeuvre(plan), OptimalSettings):
+            Simulation(plan, seed, trial)
     return {
-        kind: _designed(plan, plan.manoeuvre, seed) if isinstance(plan.manoeuvre, OptimalSettings) else plan
+        kind: _designed(plan, found, seed) if isinstance(found := _manoeuvre(plan), OptimalSettings) else plan
         for kind, plan in plans.items()
     }
 
 
+def _manoeuvre(plan: Scenario) -> Any:
+    """The manoeuvre of the only vehicle."""
+    return getattr(plan.lone[1].mission, "manoeuvre", None)
+
+
 def _designed(plan: Scenario, settings: OptimalSettings, seed: int) -> Scenario:
-    """The plan with the manoeuvre designed on the model condensed at its speed; prints what to expect of it."""
+    """The plan with the manoeuvre designed on the planar model fitted at its speed; prints what to expect of it."""
     from auvsim.identification import excitation, information
     from auvsim.physics.planar_fit import fit_planar_model
     from auvsim.vehicles import library
 
-    model = fit_planar_model(plan.vehicle.model, settings.speed, plan.world.water_density)
-    vehicle = library.vehicle(plan.vehicle.model)
-    if model.shaft_speed_for(settings.fastest) > vehicle.shaft_limit:
-        text = f"the shaft of '{vehicle.name}' cannot hold {settings.fastest:g} m/s"
+    name, of_vehicle = plan.lone
+    model = fit_planar_model(of_vehicle.model, settings.speed, plan.water.density)
+    vehicle = library.vehicle(of_vehicle.model)
+    if model.shaft_speed_for(settings.fastest) > vehicle.actuation.shaft_limit:
+        text = f"the shaft of '{vehicle.model}' cannot hold {settings.fastest:g} m/s"
         raise InputError(f"manoeuvre optimal: {text}")
     bench = excitation.Bench(
-        experiment=information.Experiment(model.parameters, plan.sensors),
+        experiment=information.Experiment(model.parameters, of_vehicle.sensors),
         shaft_speed=model.shaft_speed_for,
-        rudder_limit=vehicle.allocation.limit,
+        rudder_limit=vehicle.actuation.fin_limit,
     )
     if not information.is_warm():
-        with report.waiting(dock.COMPILING.format("information")):
+        with report.waiting(running.COMPILING.format("information")):
             bench.approach(settings)
     with report.DesignProgress() as progress:
         found = excitation.design(settings, bench, seed=seed, progress=progress)
@@ -112,4 +118,5 @@ def _designed(plan: Scenario, settings: OptimalSettings, seed: int) -> Scenario:
         name: bench.carry_out(standard, settings) for name, standard in excitation.standards(settings, bench).items()
     }
     report.information(bench.experiment.free, {"optimal": found.outcome, **standards}, settings.room)
-    return plan.model_copy(update={"manoeuvre": found.table})
+    mission = of_vehicle.mission.model_copy(update={"manoeuvre": found.table})
+    return plan.model_copy(update={"vehicles": {name: of_vehicle.model_copy(update={"mission": mission})}})

@@ -7,14 +7,16 @@ from typing import Any, get_type_hints
 
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
-from auvsim.simulation import sampling
-from auvsim.simulation.scenario import Scenario, parse
+from auvsim.simulation import loading, sampling
+from auvsim.simulation.scenario import Scenario, Start, parse
+from auvsim.simulation.sensor_settings import SensorSettings
+from auvsim.simulation.short import ShortScenario
 
 PLACE = "command line"
 
 
 def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
-    """Parts the command's own arguments from the keys of the scenario, which become nested values.
+    """Separates the command's own arguments from the keys of the scenario, which become nested values.
 
     `--current.speed 0.2` and `--current.speed=0.2` are keys; the value is YAML. Hyphens stand for underscores.
 
@@ -48,7 +50,9 @@ def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
 def scenario(
     path: Path | None, estimator: str | None, values: Mapping, seed: int, trial: int, base: Mapping | None = None
 ) -> Scenario:
-    """The definite scenario of one trial, of the default plan or of `base`.
+    """The definite scenario of one run: what a file and options pin on top of the default plan or of `base`.
+
+    A file with the key `vehicles` says all there is: nothing of the default plan comes in.
 
     Raises:
         InputError: One line with the file and line, or the option, at fault.
@@ -67,32 +71,51 @@ def scenario_text(path: Path | None, default: bool, values: Mapping) -> str:
         raise InputError("scenario --default: takes no file and no keys; leave --default out to see what they make")
     plan, places = _plan(path, values, None)
     parse(sampling.draw(plan, 0, 0, places), places)
-    return schema.commented(Scenario, plan)
+    return schema.commented(Scenario if "vehicles" in plan else ShortScenario, plan)
 
 
 def _plan(
     path: Path | None, values: Mapping, estimator: str | None, base: Mapping | None = None
 ) -> tuple[dict, dict[str, str]]:
-    plan, places = sampling.default_plan() if base is None else dict(base), {}
-    if path is not None:
-        pinned, places = sampling.load_plan(path)
-        plan = sampling.merge(plan, pinned)
     if estimator is not None:
-        values = sampling.merge({"estimator": {"factory": estimator}}, values)
-    return sampling.merge(plan, values), {**places, **dict.fromkeys(_paths(values), PLACE)}
+        values = sampling.merge({"estimator": {"kind": estimator}}, values)
+    plan, places = loading.plan_of(path, values, base)
+    if "vehicles" in plan and "estimator" in values:
+        raise InputError(f"{PLACE}: the scenario names its vehicles; give --vehicles.NAME.estimator.kind")
+    return plan, {**places, **dict.fromkeys(_paths(values), PLACE)}
 
 
 def _check(key: str, name: str, own: list[str]) -> None:
     """Refuses an option that is no key of the scenario."""
-    known = list(dict.fromkeys(schema.keys(Scenario)))
-    # Below a value may stand a distribution or what a mapping of free form holds: `parse` judges those.
-    values = [other for other in known if not any(below.startswith(f"{other}.") for below in known)]
-    if key in known or any(key.startswith(f"{value}.") for value in values):
+    known = [*dict.fromkeys([*schema.keys(ShortScenario), *(f"start.{key}" for key in schema.keys(Start))])]
+    if key in ("start", "estimator.factory") or _is_key(key, known) or _is_key(key, list(schema.keys(Scenario))):
         return
     siblings = [other for other in known if other.count(".") == key.count(".")]
     near = get_close_matches(key, [*own, *siblings], n=1)
-    hint = f"did you mean --{near[0]}?" if near else schema.suggestion(key, Scenario, [])
+    hint = f"did you mean --{near[0]}?" if near else schema.suggestion(key, ShortScenario, [])
     raise InputError(f"{PLACE}: no option or scenario key --{name}; {hint}")
+
+
+def _is_key(key: str, known: list[str]) -> bool:
+    """Whether a dotted key is known, or below a known one that holds a value.
+
+    Below a value may stand a distribution or what a mapping of free form holds: `parse` judges those, and so it does
+    with sensors under names of the user's own.
+    """
+    parts = key.split(".")
+    for other in known:
+        pattern = other.split(".")
+        is_leaf = not any(below.startswith(f"{other}.") for below in known)
+        if (len(parts) == len(pattern) or (is_leaf and len(parts) > len(pattern))) and all(
+            b in ("*", a) for a, b in zip(parts, pattern, strict=False)
+        ):
+            return True
+    return "sensors" in parts and len(parts) >= parts.index("sensors") + 3 and _names_a_sensor(parts)
+
+
+def _names_a_sensor(parts: list[str]) -> bool:
+    """Whether a key is of a sensor that has a name of the user's own."""
+    return parts[parts.index("sensors") + 1] not in SensorSettings.model_fields
 
 
 def _put(values: dict, key: str, value: Any) -> None:

@@ -7,27 +7,44 @@ from typing import Any
 
 from auvsim.base.errors import InputError
 from auvsim.base.files import whole
-from auvsim.data.log import TrialLog, read
+from auvsim.data.log import Log, read
 
 NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `auvsim video {log}` makes it"
+VIDEOS = ("docking.mp4", "run.mp4")  # of a docking by one vehicle, and of anything else
 
 
-def plots(log: TrialLog, folder: Path) -> None:
-    """Draws track.png and estimates.png; of a manoeuvre one picture of its name."""
-    from auvsim.analysis import manoeuvre_plots, plots
-    from auvsim.missions.manoeuvres import laws as manoeuvres
+def is_manoeuvre(log: Log) -> bool:
+    """Whether a log is that of one vehicle's manoeuvre."""
+    return len(log.vehicles) == 1 and log.vehicle().mission == "manoeuvre"
+
+
+def plots(log: Log, folder: Path) -> None:
+    """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png."""
+    from auvsim.analysis import fleet_plots, manoeuvre_plots, plots
+    from auvsim.missions.manoeuvres import laws
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
-    pictures = ((plots.track, "track.png"), (plots.estimates, "estimates.png"))
-    if manoeuvre_metrics.is_manoeuvre(log):
-        pictures = ((manoeuvre_plots.manoeuvre, f"{manoeuvres.name(manoeuvre_metrics.settings(log))}.png"),)
-    for draw, name in pictures:
+    if is_manoeuvre(log):
+        vehicle = log.vehicle()
+        with whole(folder / f"{laws.name(manoeuvre_metrics.settings(vehicle))}.png") as partial:
+            manoeuvre_plots.manoeuvre(vehicle, partial)
+        return
+    if len(log.vehicles) > 1:
+        with whole(folder / "fleet.png") as partial:
+            fleet_plots.fleet(log, partial)
+        return
+    for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
         with whole(folder / name) as partial:
-            draw(log, partial)
+            draw(log.vehicle(), partial)
 
 
-def video(log: TrialLog, folder: Path, *, speed: float | None = None, cameras: Sequence[str] = ()) -> None:
-    """Draws docking.mp4, with a progress bar.
+def video_name(log: Log) -> str:
+    """What the video of a log is called."""
+    return VIDEOS[0] if len(log.vehicles) == 1 and log.vehicle().mission == "docking" else VIDEOS[1]
+
+
+def video(log: Log, folder: Path, *, speed: float | None = None, cameras: Sequence[str] = ()) -> None:
+    """Draws the video, with a progress bar.
 
     Raises:
         DrawingError: Without OpenGL.
@@ -35,43 +52,44 @@ def video(log: TrialLog, folder: Path, *, speed: float | None = None, cameras: S
     from auvsim import video
     from auvsim.cli.report import VideoProgress
 
-    with VideoProgress() as progress, whole(folder / "docking.mp4") as partial:
+    with VideoProgress() as progress, whole(folder / video_name(log)) as partial:
         video.render(log, partial, speed=speed, cameras=cameras, progress=progress)
 
 
-def still(log: TrialLog, folder: Path, *, path: Path, time: float | None = None, cameras: Sequence[str] = ()) -> None:
+def still(log: Log, folder: Path, *, path: Path, time: float | None = None, cameras: Sequence[str] = ()) -> None:
     """Draws one picture, wherever it is to be.
 
     Raises:
+        InputError: It is no PNG.
         DrawingError: Without OpenGL.
     """
+    if path.suffix.lower() != ".png":
+        raise InputError(f"command line: --still {path}: the picture is a PNG; give a name that ends in .png")
     from auvsim import video
 
     video.still(log, path, time, cameras=cameras)
 
 
-def summary(log: TrialLog, folder: Path) -> dict[str, Any]:
+def summary(log: Log, folder: Path) -> dict[str, Any]:
     """Writes summary.json and returns what it holds."""
-    from auvsim.missions.docking import metrics
-    from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
+    from auvsim.analysis.summary import summarise_all
 
-    of_manoeuvre = manoeuvre_metrics.is_manoeuvre(log)
-    values = manoeuvre_metrics.summary(log) if of_manoeuvre else metrics.summarise(log).to_dict()
+    values = summarise_all(log)
     with whole(folder / "summary.json") as partial:
         partial.write_text(json.dumps(values, indent=2, allow_nan=False) + "\n", encoding="utf-8")
     return values
 
 
-def show_summary(log: TrialLog, folder: Path) -> None:
+def show_summary(log: Log, folder: Path) -> None:
     """Writes summary.json and prints it as a table."""
     from auvsim.cli import report
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
     values = summary(log, folder)
-    if manoeuvre_metrics.is_manoeuvre(log):
-        report.manoeuvres(manoeuvre_metrics.figures(log))
+    if is_manoeuvre(log):
+        report.manoeuvres(manoeuvre_metrics.figures(log.vehicle()))
     else:
-        report.table(values)
+        report.show(values)
 
 
 def again(path: Path, make: Callable[..., None], /, **options: Any) -> int:

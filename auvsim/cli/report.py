@@ -11,7 +11,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvsim.base import plugins
+from auvsim.base.errors import InputError
 from auvsim.missions.manoeuvres.metrics import LABELS, Figures
+from auvsim.missions.registry import find
 
 if TYPE_CHECKING:
     from auvsim.identification.excitation import Outcome
@@ -27,7 +30,7 @@ class ProgressState(Protocol):
     time: float  # simulated time [s]
     duration: float  # time limit [s]
     phase: str
-    range: float  # true distance to the dock's mouth [m]
+    range: float  # true distance to the dock's mouth [m]; NaN without one
 
 
 class _Bar:
@@ -61,7 +64,8 @@ class TrialProgress(_Bar):
         super().__init__(name)
 
     def __call__(self, state: ProgressState) -> None:
-        self._show(state.time, state.duration, f"{state.phase}  {state.range:6.1f} m  {state.time:6.1f} s")
+        away = "" if math.isnan(state.range) else f"  {state.range:6.1f} m"
+        self._show(state.time, state.duration, f"{state.phase}{away}  {state.time:6.1f} s")
 
 
 class VideoProgress(_Bar):
@@ -109,7 +113,7 @@ class CampaignState(Protocol):
 
     done: int
     total: int  # at most
-    docked: int
+    successes: int
     errors: int
     rate: float  # trials a second
     remaining: float  # [s]
@@ -123,7 +127,7 @@ class CampaignProgress(_Bar):
         self._line = 0.0
 
     def __call__(self, state: CampaignState) -> None:
-        failed = state.done - state.docked
+        failed = state.done - state.successes
         text = f"{state.done}/{state.total} done  {failed} failed"
         text += f" ({state.errors} by errors)" if state.errors else ""
         text += f"  {state.rate:.2f} a second  {_duration(state.remaining)} to go"
@@ -148,13 +152,16 @@ def waiting(text: str) -> Iterator[None]:
         yield
 
 
-ROWS = {  # key of the summary: what the table calls it
+ROWS = {  # key of a summary: what the table calls it; those that a vehicle's summary has are shown
     "docked": "docked",
+    "finished": "finished",
     "failure_text": "because",
     "attempts": "attempts",
+    "waypoints": "waypoints reached",
     "time": "time [s]",
     "miss_distance": "miss distance at the entrance [m]",
     "heading_error_deg": "heading error at the entrance [deg]",
+    "cross_track_rms": "distance from the track, rms [m]",
     "contact_impulse": "contact impulse [N s]",
     "peak_contact_force": "largest contact force [N]",
     "fixes_sent": "fixes sent",
@@ -164,17 +171,38 @@ ROWS = {  # key of the summary: what the table calls it
 }
 
 
-def table(summary: Mapping[str, Any]) -> None:
-    """Prints a summary as one table: the verdict, then the errors of the estimate by phase."""
-    table = Table("", "", title="docking trial", show_header=False)
-    for key, label in ROWS.items():
-        if summary[key] is not None:
-            table.add_row(label, _text(summary[key]))
-    for phase, quality in summary["estimate"].items():
-        error = f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}"
+def show(summary: Mapping[str, Any]) -> None:
+    """Prints the summary of a run as one table, a column a vehicle: the verdict, then the errors of the estimate."""
+    several = summary.get("vehicles")
+    vehicles: Mapping[str, Mapping[str, Any]] = several or {"": summary}
+    missions = {str(values["mission"]) for values in vehicles.values()}
+    rows = {key: label for kind in sorted(missions) for key, label in _of_its_own(kind).items()} | ROWS
+    title = f"{missions.pop().rpartition(':')[2]} trial" if len(missions) == 1 else "run"
+    table = Table("", *vehicles, title=title, show_header=bool(several))
+    for key, label in rows.items():
+        if any(values.get(key) is not None for values in vehicles.values()):
+            table.add_row(label, *(_text(values.get(key)) for values in vehicles.values()))
+    phases = dict.fromkeys(phase for values in vehicles.values() for phase in values["estimate"])
+    for phase in phases:
         where = "all phases" if phase == "all" else phase.replace("_", " ")
-        table.add_row(f"position rms [m], NEES per axis, {where}", error)
+        cells = (_errors(values["estimate"].get(phase)) for values in vehicles.values())
+        table.add_row(f"position rms [m], NEES per degree of freedom, {where}", *cells)
     Console(markup=False).print(table)  # units stand in brackets
+
+
+def _of_its_own(kind: str) -> dict[str, str]:
+    """Labels of the metrics that a mission of the user's own declares, by their keys; of a shipped one none."""
+    if not plugins.is_own(kind):
+        return {}
+    try:
+        columns = find(kind).columns  # pyright: ignore[reportFunctionMemberAccess]
+    except (InputError, AttributeError):  # its class is not here any more, or declares none
+        return {}
+    return {key: f"{m.meaning} [{m.units}]" if m.units not in ("", "1") else m.meaning for key, m in columns.items()}
+
+
+def _errors(quality: Mapping[str, Any] | None) -> str:
+    return f"{_text(quality['position_rms'])}, {_text(quality['nees_per_dof'])}" if quality else ""
 
 
 def manoeuvres(found: Sequence[Figures]) -> None:
@@ -189,7 +217,7 @@ def manoeuvres(found: Sequence[Figures]) -> None:
 
 
 def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", room: float) -> None:
-    """Prints what manoeuvres of one duration would tell of parameters as one table, a column each."""
+    """Prints the information of manoeuvres of one duration on the parameters as one table, a column each."""
     table = Table("", title="expected standard deviation of each parameter [% of its value]")
     for name in outcomes:
         table.add_column(name, justify="right")

@@ -10,8 +10,8 @@ from rich.console import Console
 from rich.table import Table
 
 from auvsim.base.errors import InputError
-from auvsim.cli.dock import output_folder
 from auvsim.cli.report import StudyProgress
+from auvsim.cli.run import output_folder
 from auvsim.reproduce import paired
 from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
 from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
@@ -25,7 +25,7 @@ from auvsim.reproduce.paper1.truths import DRAWN
 
 WIDTH = 150  # of the widest table [columns]
 LEGEND = (
-    "Ratios are rms errors by that of the paper's filter in the same runs. REG same noise as the paper's filter, REG* "
+    "Ratios are rms errors relative to the paper's filter in the same runs. REG same noise as the paper's filter, REG* "
     "its best, neither delay nor current; DLY delay only; CUR current only (eq. 11); A, A0 current as two states with "
     "1e-5, 1e-8 m2/s3; IMM two of A with outliers inside. NEES is of the position per axis, 1 if consistent."
 )

@@ -1,19 +1,24 @@
 """Autopilot: heading, depth (through pitch) and open-loop water speed, from the compass and the depth gauge alone."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from typing import Literal
 
 from pydantic import Field
 
+from auvsim.base.alpha_beta import AlphaBeta
+from auvsim.base.errors import InputError
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
-from auvsim.navigation.navigator import Commands
+from auvsim.control.controller import ControllerSetup, Setpoints
+from auvsim.vehicles.actuation import Commands, FinsAndShaft
 
 
-class ControlSettings(Settings):
-    """Gains of the autopilot."""
+class AutopilotSettings(Settings):
+    """Gains of the autopilot of a torpedo: fins and one shaft."""
 
+    kind: Literal["torpedo"] = Field(default="torpedo", description="torpedo, or package.module:Class")
     heading_gain: float = Field(default=2.0, gt=0, description="rudder per heading error [rad/rad]")
     yaw_rate_gain: float = Field(default=2.5, ge=0, description="rudder per yaw rate [s]")
     pitch_gain: float = Field(default=2.5, gt=0, description="stern plane per pitch error [rad/rad]")
@@ -28,63 +33,28 @@ class ControlSettings(Settings):
     pitch_limit_deg: float = Field(default=20.0, gt=0, le=45, description="largest commanded pitch [deg]")
 
 
-WAY = 5.0  # time in which the speed through the water follows a command, roughly [s]
-
-
-class _Smoother:
-    """Alpha-beta filter of a sampled quantity and its rate (Bar-Shalom 2001, sec. 6.5)."""
-
-    def __init__(self, tracking_index: float, angle: bool) -> None:
-        damping = (4 + tracking_index - math.sqrt(8 * tracking_index + tracking_index**2)) / 4
-        self._alpha = 1 - damping**2
-        self._beta = 2 * (2 - self._alpha) - 4 * math.sqrt(1 - self._alpha)
-        self._angle = angle
-        self.value: float | None = None
-        self.rate = 0.0
-        self._stamp = 0.0
-
-    def update(self, stamp: float, measured: float) -> None:
-        if self.value is None:
-            self.value, self._stamp = measured, stamp
-            return
-        dt = stamp - self._stamp
-        if dt <= 0.0:
-            return
-        innovation = measured - self.value - self.rate * dt
-        if self._angle:
-            innovation = wrap(innovation)
-        self.value += self.rate * dt + self._alpha * innovation
-        self.rate += self._beta * innovation / dt
-        self._stamp = stamp
+SPEED_TIME_CONSTANT = 5.0  # in which the speed through the water follows a command, roughly [s]
 
 
 class Autopilot:
-    """Turns commanded heading, depth and speed into rudder, stern plane and shaft speed.
+    """Turns a heading, a depth and a speed into rudder, stern plane and shaft speed; see `Controller`."""
 
-    Args:
-        settings: gains.
-        shaft_speed: the shaft speed [rad/s] that holds a speed through the water >= 0 [m/s].
-        fin_limit: largest effective rudder and stern plane [rad].
-        shaft_limit: largest shaft speed [rad/s].
-        period: time between calls [s].
-    """
+    Settings = AutopilotSettings
 
-    def __init__(
-        self,
-        settings: ControlSettings,
-        shaft_speed: Callable[[float], float],
-        fin_limit: float,
-        shaft_limit: float,
-        period: float,
-    ) -> None:
-        self._settings, self._shaft_for = settings, shaft_speed
-        self._fin_limit, self._shaft_limit, self._period = fin_limit, shaft_limit, period
-        self._pitch_limit = math.radians(settings.pitch_limit_deg)
-        # Tracking indices (acceleration noise x period^2 / measurement noise) of the default sensors.
-        self._heading, self._pitch = _Smoother(0.03, True), _Smoother(0.03, True)
-        self._depth = _Smoother(0.004, False)
+    def __init__(self, setup: ControllerSetup) -> None:
+        actuation = setup.actuation
+        if not isinstance(actuation, FinsAndShaft):
+            raise InputError(
+                f"control.kind: torpedo steers by fins and a shaft, not by {', '.join(actuation.channels)}"
+            )
+        self._settings, self._shaft_for, self._period = setup.settings, setup.shaft_speed, setup.period
+        self._fin_limit, self._shaft_limit = actuation.fin_limit, actuation.shaft_limit
+        self._pitch_limit = math.radians(self._settings.pitch_limit_deg)
+        # Tracking indices of the default sensors.
+        self._heading, self._pitch = AlphaBeta.of_index(0.03, angle=True), AlphaBeta.of_index(0.03, angle=True)
+        self._depth = AlphaBeta.of_index(0.004)
         self._integral = 0.0
-        self._way: float | None = None  # speed through the water, by dead reckoning from the commands [m/s]
+        self._speed: float | None = None  # through the water, by dead reckoning from the commands [m/s]
         self._shaft: tuple[float, float] = (math.nan, 0.0)  # the last speed and its shaft speed
 
     def observe(self, readings: Sequence[Reading]) -> None:
@@ -107,24 +77,23 @@ class Autopilot:
         """Smoothed depth [m], None before the first reading."""
         return self._depth.value
 
-    def command(self, heading: float, depth: float, speed: float, rudder: float | None = None) -> Commands:
-        """Actuator commands for a heading [rad], a depth [m] and a speed through the water [m/s], negative astern.
-
-        A `rudder` [rad] that is given is taken as it is, and the heading left alone.
-        """
+    def command(self, setpoints: Setpoints) -> Commands:
+        """The demand now; a rudder among the setpoints is passed on as it is, in place of heading control."""
+        heading, depth, speed, rudder = setpoints
         s, shaft_speed = self._settings, self._shaft_speed(speed)
-        self._way = speed if self._way is None else self._way + (speed - self._way) * self._period / WAY
+        previous = speed if self._speed is None else self._speed
+        self._speed = previous + (speed - previous) * self._period / SPEED_TIME_CONSTANT
         if self._heading.value is None or self._pitch.value is None or self._depth.value is None:
             return Commands(0.0, 0.0, shaft_speed)
         holding = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
         error = depth - self._depth.value
         wanted = -(s.depth_gain * error + s.depth_integral_gain * self._integral)
         pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
-        # Positive stern plane dives. The integral stands still while pitch is limited or the vehicle is far off.
+        # Positive stern plane dives. The integral is frozen while pitch is limited or the depth error is large.
         elevator = s.pitch_gain * (self._pitch.value - pitch) + s.pitch_rate_gain * self._pitch.rate
         if abs(error) < 0.5 and pitch == wanted:
             self._integral += error * self._period
-        if self._way < 0.0:  # fins act the other way round when the flow comes from astern
+        if self._speed < 0.0:  # fins act the other way round when the flow comes from astern
             holding, elevator = -s.astern_factor * holding, -elevator
         rudder = holding if rudder is None else rudder
         limit = self._fin_limit

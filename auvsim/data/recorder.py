@@ -1,9 +1,11 @@
-"""Keeps what happens in a running trial, cheaply, until it becomes a TrialLog."""
+"""Records a run at little cost; the log of a long run grows on disk."""
 
 import importlib.metadata
 import math
+import os
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,28 +14,76 @@ from numpy.typing import NDArray
 import auvsim
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.reading import Reading
-from auvsim.data.log import FORMAT_VERSION, SIZES, STATUSES, TABLE, VERSIONS, WALL_TIME, TrialLog, Variable, check
+from auvsim.data import netcdf
+from auvsim.data.attributes import FORMAT_VERSION, STATUSES, VERSIONS, WALL_TIME
+from auvsim.data.checks import check
+from auvsim.data.fields import empty, parts
+from auvsim.data.log import Log
+from auvsim.data.stream import Stream
+from auvsim.data.variables import Group
 from auvsim.physics.truth import Truth
 
+PACKED = 4096  # rows after which a group is packed into arrays
 
-class LogWriter:
-    """Keeps the rows of a running trial; arrays are made once, at the end."""
+Attributes = Mapping[str, str | int | float]
 
-    def __init__(self, *, attributes: Mapping[str, str | int | float], fins: int) -> None:
-        """Starts an empty log of a vehicle with `fins` fins; the attributes are REQUIRED_ATTRIBUTES and any others."""
+
+class Recorder:
+    """Keeps the rows of a run by group, and packs them into arrays every PACKED rows.
+
+    With a path, packed rows go to a partial file beside it. `finish` gives it its name; `discard` removes it, as does
+    leaving a `with` block without `finish`.
+    """
+
+    def __init__(
+        self,
+        tables: Mapping[str, Group],
+        attributes: Attributes,
+        group_attributes: Mapping[str, Attributes],
+        path: str | os.PathLike[str] | None = None,
+    ) -> None:
+        """Starts an empty log.
+
+        Args:
+            tables: Every group of the log by its path, as `variables.run_groups` gives them.
+            attributes: Of the run: scenario, seed, trial and others; `finish` adds format, status and versions.
+            group_attributes: By path of vehicle or structure: vehicles/remus100, structures/dock.
+            path: Where the log is to stand; None keeps it in memory.
+
+        Raises:
+            InputError: if the file cannot be written.
+        """
+        self._tables = dict(tables)
         self._attributes = dict(attributes)
-        fixed = {name: size for name, size in SIZES.items() if size is not None}
-        self._sizes = {**fixed, "fin": fins, "fins_and_shaft": fins + 1}
-        self._rows: dict[str, list[Sequence[Any]]] = {group: [] for group in TABLE if group != "truth"}
-        self._truths: list[tuple[float, ...]] = []
+        self._group_attributes = {name: dict(values) for name, values in group_attributes.items()}
+        nothing = {path: {name: item.values for name, item in empty(group).items()} for path, group in tables.items()}
+        check(self._log(nothing, "interrupted"), "log")  # what is wrong with it should not come out after the run
+        self._rows: dict[str, list[Sequence[Any]]] = {group: [] for group in tables}
+        self._chunks: dict[str, list[dict[str, NDArray[Any]]]] = {group: [] for group in tables}
+        self._sensors = {(p[1], p[3]): path for path in tables if len(p := path.split("/")) == 4 and p[2] == "sensors"}
+        self._stream = None if path is None else Stream(Path(path), tables)
+
+    def __enter__(self) -> "Recorder":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.discard()
 
     def append(self, group: str, row: Sequence[Any]) -> None:
-        """Appends one row, in the order of the table, to any group but truth. Arrays are kept by reference."""
-        self._rows[group].append(row)
+        """Appends one row, in the order of the group's table. Arrays are kept by reference.
 
-    def truth(self, truth: Truth) -> None:
-        """Appends a truth, copied: one flat tuple, which costs a fifth of one with a list for each array."""
-        self._truths.append(
+        Raises:
+            InputError: if the rows that are packed now do not fit the table, or the file cannot be written.
+        """
+        rows = self._rows[group]
+        rows.append(row)
+        if len(rows) >= PACKED:
+            self._pack(group)
+
+    def truth(self, vehicle: str, truth: Truth) -> None:
+        """Appends a vehicle's truth, copied: one flat tuple, which costs a fifth of one with a list for each array."""
+        self.append(
+            f"vehicles/{vehicle}/truth",
             (
                 truth.time,
                 *truth.position.tolist(),
@@ -41,80 +91,123 @@ class LogWriter:
                 *truth.attitude.tolist(),
                 *truth.nu.tolist(),
                 *truth.current.tolist(),
-                *truth.fins.tolist(),
-                truth.shaft_speed,
-            )
+                *truth.actuators.tolist(),
+            ),
         )
 
-    def reading(self, reading: Reading, *, lost: bool = False, outlier: bool = False) -> None:
-        """Appends a reading to its sensor's group; a lost one is logged as never received."""
-        if lost:
-            reading = reading._replace(received=math.nan)
-        row = reading[1:]  # a tuple, which unlike a list the garbage collector does not look through again and again
-        self._rows[reading.sensor].append((*row, lost, outlier) if reading.sensor == "usbl" else row)
+    def reading(self, vehicle: str, reading: Reading, *extra: Any) -> None:
+        """Appends a reading to its sensor's group, with the values of the sensor's own columns.
 
-    def event(self, time: float, kind: str, text: str) -> None:
-        """Appends an event."""
-        self._rows["event"].append((time, kind, text))
+        A reading that was lost has NaN for the time it was received.
+        """
+        # A tuple, which unlike a list the garbage collector does not look through again and again.
+        self.append(self._sensors[vehicle, reading.sensor], reading[1:] + extra)
 
-    def finish(self, status: str, *, wall_time: float = math.nan) -> TrialLog:
-        """The log of the trial that ended with `status`.
+    def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
+        """Appends an event of a vehicle, or of the run as a whole with vehicle ""."""
+        self.append("event", (time, vehicle, kind, text))
+
+    def finish(self, status: str, *, wall_time: float = math.nan) -> Log:
+        """The log of the run that ended with `status`; with a path, also its file.
 
         Raises:
-            InputError: if the status is unknown, a row does not fit the table or an attribute is missing.
+            InputError: if the status is unknown, a row does not fit its table, an attribute is missing or the file
+                cannot be written.
         """
         if status not in STATUSES:
             raise unknown_name("status", status, list(STATUSES))
-        groups = {"truth": self._truth_columns()} | {group: self._columns(group) for group in self._rows}
+        for group in self._tables:
+            self._pack(group)
+        if self._stream is not None:
+            return self._finish_stream(self._stream, status, wall_time)
+        log = self._log({group: self._joined(group) for group in self._tables}, status, wall_time)
+        check(log, "log")
+        return log
+
+    def _finish_stream(self, stream: Stream, status: str, wall_time: float) -> Log:
+        stream.close({"": self._log({}, status, wall_time).attributes, **self._group_attributes})
+        log = Log(*parts(netcdf.load(stream.partial), str(stream.path)))
+        check(log, str(stream.path))
+        stream.rename()
+        self._stream = None
+        return log
+
+    def _log(self, groups: dict[str, dict[str, NDArray[Any]]], status: str, wall_time: float = math.nan) -> Log:
         attributes = self._attributes | {
             "format_version": FORMAT_VERSION,
             "status": status,
             WALL_TIME: wall_time,
             **{name: version(package) for name, package in VERSIONS.items()},
         }
-        log = TrialLog(groups, attributes)
-        check(log, "log")
-        return log
+        tables = {group: dict(found.table) for group, found in self._tables.items()}
+        return Log(groups, tables, attributes, self._group_attributes)
 
-    def _truth_columns(self) -> dict[str, NDArray[Any]]:
-        variables = TABLE["truth"]
-        shapes = [self._shape(len(self._truths), variable) for variable in variables.values()]
-        ends = np.cumsum([math.prod(shape[1:]) for shape in shapes])
-        try:
-            flat = np.array(self._truths, dtype=float).reshape(len(self._truths), ends[-1])
-        except ValueError as error:
-            raise InputError(f"log: a truth should have {ends[-1]} numbers: {error}") from None
-        parts = zip(variables, np.split(flat, ends[:-1], axis=1), shapes, strict=True)
-        return {name: np.ascontiguousarray(part).reshape(shape) for name, part, shape in parts}
+    def discard(self) -> None:
+        """Removes what was written of a log that is not finished."""
+        if self._stream is not None:
+            self._stream.discard()
+            self._stream = None
 
-    def _columns(self, group: str) -> dict[str, NDArray[Any]]:
-        rows, variables = self._rows[group], TABLE[group]
-        for wrong in {*map(len, rows)} - {len(variables)}:
-            names = ", ".join(variables)
-            raise InputError(f"log: a row of '{group}' has {wrong} values, not {len(variables)}: {names}")
+    def _pack(self, group: str) -> None:
+        rows = self._rows[group]
+        if not rows:
+            return
+        pack = _packed_truth if group.split("/")[2:] == ["truth"] else _packed
+        columns = pack(rows, self._tables[group], group)
+        self._rows[group] = []
+        if self._stream is not None:
+            self._stream.append(group, columns)
+        else:
+            self._chunks[group].append(columns)
+
+    def _joined(self, group: str) -> dict[str, NDArray[Any]]:
+        chunks, found = self._chunks[group], self._tables[group]
+        if len(chunks) == 1:
+            return chunks[0]
         columns = {}
-        kept = zip(*rows, strict=True) if rows else [()] * len(variables)
-        for (name, variable), values in zip(variables.items(), kept, strict=True):
-            shape = self._shape(len(rows), variable)
-            try:
-                dtype = object if variable.dtype == "str" else variable.dtype
-                columns[name] = (_joined if len(shape) > 1 else np.array)(values, dtype=dtype).reshape(shape)
-            except (TypeError, ValueError) as error:
-                raise InputError(f"log: '{group}/{name}' should have shape {shape}: {error}") from None
+        for name, variable in found.table.items():
+            kept = [chunk.pop(name) for chunk in chunks]  # each goes as soon as it is copied
+            nothing = np.zeros(found.shape(0, name), dtype=variable.array_type)
+            columns[name] = np.concatenate(kept) if kept else nothing
         return columns
 
-    def _shape(self, rows: int, variable: Variable) -> tuple[int, ...]:
-        return (rows, *(self._sizes[dimension] for dimension in variable.dimensions))
+
+def _packed_truth(rows: Sequence[Sequence[float]], group: Group, path: str) -> dict[str, NDArray[Any]]:
+    """Arrays of flat rows."""
+    shapes = [group.shape(len(rows), name) for name in group.table]
+    ends = np.cumsum([math.prod(shape[1:]) for shape in shapes])
+    try:
+        flat = np.array(rows, dtype=float).reshape(len(rows), ends[-1])
+    except ValueError as error:
+        raise InputError(f"log: a row of '{path}' should have {ends[-1]} numbers: {error}") from None
+    columns = zip(group.table, np.split(flat, ends[:-1], axis=1), shapes, strict=True)
+    return {name: np.ascontiguousarray(part).reshape(shape) for name, part, shape in columns}
 
 
-def _joined(arrays: Sequence[NDArray[Any]], dtype: Any) -> NDArray[Any]:
+def _packed(rows: Sequence[Sequence[Any]], group: Group, path: str) -> dict[str, NDArray[Any]]:
+    """Arrays of rows with a value for each variable."""
+    for wrong in {*map(len, rows)} - {len(group.table)}:
+        names = ", ".join(group.table)
+        raise InputError(f"log: a row of '{path}' has {wrong} values, not {len(group.table)}: {names}")
+    columns = {}
+    for (name, variable), values in zip(group.table.items(), zip(*rows, strict=True), strict=True):
+        shape = group.shape(len(rows), name)
+        try:
+            make = _concatenated if len(shape) > 1 else np.array
+            columns[name] = make(values, dtype=variable.array_type).reshape(shape)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"log: '{path}/{name}' should have shape {shape}: {error}") from None
+    return columns
+
+
+def _concatenated(arrays: Sequence[NDArray[Any]], dtype: Any) -> NDArray[Any]:
     """Arrays of one size in a row: a fifth of the time of an array of arrays."""
     if len({*map(len, arrays)}) > 1:
         raise ValueError("the rows have different sizes")
-    return np.concatenate(arrays, dtype=dtype) if arrays else np.array((), dtype=dtype)
+    return np.concatenate(arrays, dtype=dtype)
 
 
 @cache  # reading a package's metadata takes milliseconds
 def version(package: str) -> str:
-    """Of this or another installed package."""
+    """Version of this or another installed package."""
     return auvsim.__version__ if package == "auvsim" else importlib.metadata.version(package)

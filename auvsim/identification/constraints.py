@@ -22,17 +22,17 @@ def limits(free: Sequence[str], signs: bool) -> tuple[Array, Array]:
     return np.where(side > 0, 0.0, -np.inf), np.where(side < 0, 0.0, np.inf)
 
 
-def prior_information(start: Array, free: Sequence[str], prior: float | None, believed: Sequence[str] | None) -> Array:
+def prior_information(start: Array, free: Sequence[str], prior: float | None, prior_on: Sequence[str] | None) -> Array:
     """Information (k,) of a weak prior on free parameters about their start; zero where there is none.
 
     Args:
         start: Of the free parameters (k,).
         free: Their names.
         prior: Relative deviation from the start; None: there is no prior.
-        believed: Those that it holds; None: all.
+        prior_on: Parameters with a prior; None: all.
     """
     reach = np.abs(start) * (prior or 0.0)
-    held = (reach > 0.0) & np.array([believed is None or name in believed for name in free])
+    held = (reach > 0.0) & np.array([prior_on is None or name in prior_on for name in free])
     return np.where(held, 1.0 / np.where(held, reach, 1.0) ** 2, 0.0)
 
 

@@ -63,7 +63,7 @@ def row_of(x, channel, H):
 
 
 @compiled
-def take(x, P, value, variance, channel, H, gain):
+def correct(x, P, value, variance, channel, H, gain):
     """Corrects by one scalar, in place; the innovation and its variance."""
     n = x.size
     e = value - row_of(x, channel, H)
@@ -105,7 +105,7 @@ def track(x, P, inputs, measured, variances, p, q, h, substeps, e, s):
         for c in range(8):
             e[n, c] = s[n, c] = math.nan
             if not math.isnan(measured[n, c]) and variances[c] < math.inf:
-                e[n, c], s[n, c] = take(x, P, measured[n, c], variances[c], c, H, gain)
+                e[n, c], s[n, c] = correct(x, P, measured[n, c], variances[c], c, H, gain)
                 cost += 0.5 * (e[n, c] * e[n, c] / s[n, c] + math.log(s[n, c]))
         if not math.isfinite(cost):
             return math.inf
@@ -124,7 +124,7 @@ def trace(x, P, inputs, measured, variances, p, q, h, substeps):
     for n in range(count):
         for c in range(8):
             if not math.isnan(measured[n, c]) and variances[c] < math.inf:
-                take(x, P, measured[n, c], variances[c], c, H, gain)
+                correct(x, P, measured[n, c], variances[c], c, H, gain)
         means[n], covariances[n] = x, P
         if n + 1 < count:
             carry(x, P, inputs[n], p, q, h, substeps, following, F, work)

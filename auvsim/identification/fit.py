@@ -34,7 +34,7 @@ NUISANCES = ("current_north", "current_east", "gyro", "compass", "misalignment",
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Nuisances:
-    """Standard deviations believed beforehand of a record's constant errors, about zero; 0: there is none."""
+    """Prior standard deviations of a record's constant errors, about zero; 0: there is none."""
 
     current: float = 1.0  # each component [m/s]
     gyro: float = 5e-3  # [rad/s]
@@ -61,7 +61,7 @@ class Fit:
     covariance: Array  # (k, k) of the free parameters
     nuisances: Array  # (records, 6) in the order of NUISANCES
     nuisance_deviations: Array  # (records, 6)
-    residual_rms: Array  # (8,) by MEASURED, in units of the deviations believed; NaN where nothing was measured
+    residual_rms: Array  # (8,) by MEASURED, in units of the assumed deviations; NaN where nothing was measured
     whiteness: tuple[Whiteness | None, ...]  # (8,) by MEASURED
     cost: float  # half the sum of squares, or the negative log likelihood
     start_cost: float  # the same at the start

@@ -24,7 +24,7 @@ FIRST = (1.0, 1.0, 1.0, 1.0, 0.3, 0.3)  # deviations of the first north, east [m
 
 def is_warm() -> bool:
     """Whether an experiment runs at once; if not, its first use compiles for some seconds."""
-    return is_ready(compiled.information().gather)
+    return is_ready(compiled.information().accumulate)
 
 
 class Progressed(NamedTuple):
@@ -70,7 +70,7 @@ class Experiment:
             scale=sensors.dvl.scale_error,
         )
         # An error of zero is known: as good as none, without an infinite weight.
-        self._believed = np.array([*FIRST, *np.maximum(errors.vector(), 1e-9)])
+        self._prior = np.array([*FIRST, *np.maximum(errors.vector(), 1e-9)])
         self._loops = compiled.information()
 
     def start(self, surge: float) -> Progressed:
@@ -84,11 +84,13 @@ class Experiment:
         """Goes on with inputs (n, 2), rudder [rad] and shaft speed [rad/s], each held for STEP; measures after each."""
         state, sensitivity, gathered = before.state.copy(), before.sensitivity.copy(), before.gathered.copy()
         inputs = np.ascontiguousarray(inputs, dtype=float)
-        reach = self._loops.gather(state, sensitivity, gathered, inputs, self.weights, self._vector, self._free, STEP)
+        reach = self._loops.accumulate(
+            state, sensitivity, gathered, inputs, self.weights, self._vector, self._free, STEP
+        )
         return Progressed(state, sensitivity, gathered, max(before.reach, float(reach)))
 
     def information(self, progressed: Progressed) -> Array:
-        """Information (k, k) on the free parameters, each as a share of its value, and what was believed beforehand.
+        """Information (k, k) on the free parameters, each as a share of its value, and of the prior.
 
         First state and constant errors, which are not asked for, are eliminated (Schur complement).
         """
@@ -96,7 +98,7 @@ class Experiment:
         whole = np.triu(progressed.gathered) + np.triu(progressed.gathered, 1).T
         asked, rest = np.arange(6, 6 + k), np.r_[0:6, 6 + k : 12 + k]
         cross = whole[np.ix_(asked, rest)] * self.values[:, None]
-        known = whole[np.ix_(rest, rest)] + np.diag(self._believed**-2)
+        known = whole[np.ix_(rest, rest)] + np.diag(self._prior**-2)
         own = whole[np.ix_(asked, asked)] * np.outer(self.values, self.values)
         return own - cross @ np.linalg.solve(known, cross.T) + np.eye(k) / self.share**2
 

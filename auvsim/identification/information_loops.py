@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 @compiled
-def gather(x, S, M, inputs, weights, p, free, h):
+def accumulate(x, S, M, inputs, weights, p, free, h):
     """Carries state and sensitivities on through inputs (n, 2), each held for `h` [s], and adds what is measured.
 
     Args:

@@ -25,7 +25,7 @@ _NUISANCES = Nuisances()
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Judged:
+class HoldoutResult:
     """One held-out record, predicted by the start and by the fit."""
 
     record: Record
@@ -104,7 +104,7 @@ def part(record: Record, first: int, stop: int) -> Record:
     )
 
 
-def judge(record: Record, start: PlanarParameters, fit: PlanarParameters) -> Judged:
+def judge(record: Record, start: PlanarParameters, fit: PlanarParameters) -> HoldoutResult:
     """Predicts a held-out record from every few seconds of it, each for the same time.
 
     Until a prediction begins, a filter on the judged model takes what is measured: so its state, the current and the
@@ -128,7 +128,7 @@ def judge(record: Record, start: PlanarParameters, fit: PlanarParameters) -> Jud
             for first, stop in ((first, first + width + 1) for first in firsts)
         )
 
-    return Judged(
+    return HoldoutResult(
         record=record,
         measured=states,
         seconds=seconds,

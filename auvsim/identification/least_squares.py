@@ -45,7 +45,7 @@ def fit_least_squares(
         start: The masses, and what is not free.
         free: Parameters in which the accelerations are linear.
         window: Over which changes are taken [s].
-        nuisances: What is believed of the current and of biases.
+        nuisances: Prior deviations of the current and of biases.
 
     Raises:
         InputError: Records or names that cannot be used; a mass is free.

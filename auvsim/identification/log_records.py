@@ -5,15 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
+from auvsim.analysis.estimates import fixes, usbl_dock
 from auvsim.base.errors import InputError
-from auvsim.data.log import TrialLog, read
+from auvsim.data.log import VehicleLog, read
 from auvsim.identification.signals import MARGIN, Signal, Signals, steep, stretches
-from auvsim.missions.docking.guidance import Phase
-from auvsim.missions.docking.metrics import fixes
 from auvsim.missions.manoeuvres import laws as manoeuvres
+from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.simulation import scenario
+from auvsim.simulation.scenario import VehicleSettings
 from auvsim.vehicles import library
-from auvsim.vehicles.allocation import Allocation
+from auvsim.vehicles.actuation import FinsAndShaft
 from estimators.core.types import Array
 
 
@@ -23,23 +24,24 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
     Raises:
         InputError: It is no whole log, or has neither fins nor heading in it.
     """
-    log = read(path)
+    log = read(path).vehicle()
     name = path.name
-    plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
+    plan = scenario.from_yaml(str(log.log.attributes["scenario"]), f"{path}: scenario").vehicles[log.name]
     for group, what in (("feedback", "fins and shaft"), ("compass", "heading")):
-        if len(log[group]["time"]) < 2:
+        if group not in log or len(log[group]["time"]) < 2:
             raise InputError(f"{path}: no readings of {group}; a fit needs {what}, log a trial of some minutes")
-    vehicle = library.vehicle(plan.vehicle.model)
+    vehicle = library.vehicle(plan.model)
     feedback = log["feedback"]
     times = feedback["time"]
     found = {
-        "rudder": Signal(times=times, values=_rudder(vehicle.allocation, feedback["value"][:, :-1])),
+        "rudder": Signal(times=times, values=_rudder(vehicle.actuation, feedback["value"])),
         "shaft_speed": Signal(times=times, values=feedback["value"][:, -1]),
         "heading": Signal(times=log["compass"]["time"], values=np.unwrap(log["compass"]["value"][:, 0])),
     }
-    if len(log["gyro"]["time"]):
+    if "gyro" in log and len(log["gyro"]["time"]):
         found["yaw_rate"] = Signal(times=log["gyro"]["time"], values=log["gyro"]["value"][:, 2])
-    for column, quantity in ((0, "ground_surge"), (1, "ground_sway"), (3, "surge"), (4, "sway")):
+    tracks = ((0, "ground_surge"), (1, "ground_sway"), (3, "surge"), (4, "sway")) if "dvl" in log else ()
+    for column, quantity in tracks:
         values = log["dvl"]["value"][:, column]
         there = np.isfinite(values)
         if there.sum() > 1:
@@ -47,38 +49,40 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
     places, where = _places(log, found["heading"], plan.sensors.usbl.transponder)
     if len(where) > 1:
         found |= {axis: Signal(times=where, values=places[:, k]) for k, axis in enumerate(("north", "east"))}
-    barred = _barred(log)
+    excluded = _excluded(log)
     end = float(times[-1])
-    out = sum(min(stop, end) - start for start, stop in barred)
-    notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if barred else []
-    deviations = _deviations(plan, places)
+    out = sum(min(stop, end) - start for start, stop in excluded)
+    notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if excluded else []
+    deviations = _deviations(plan, places - usbl_dock(log).position[:2] if len(places) else places)
     parts = [
         Signals(
             name=label, kind=kind, signals=found, deviations=deviations,
-            barred=(*barred, (-math.inf, start), (stop, math.inf)),
+            excluded=(*excluded, (-math.inf, start), (stop, math.inf)),
         )
         for label, kind, start, stop in _parts(plan, name)
     ]  # fmt: skip
-    return parts, notes, plan.vehicle.model
+    return parts, notes, plan.model
 
 
-def _parts(plan: scenario.Scenario, name: str) -> list[tuple[str, str, float, float]]:
+def _parts(plan: VehicleSettings, name: str) -> list[tuple[str, str, float, float]]:
     """Label, kind, start and end [s] of each manoeuvre of a log."""
-    if plan.manoeuvre is None:
+    if not isinstance(plan.mission, ManoeuvreMissionSettings):
         return [(name, "docking", -math.inf, math.inf)]
-    found = list(manoeuvres.parts(plan.manoeuvre))
+    found = list(manoeuvres.parts(plan.mission.manoeuvre))
     if len(found) == 1:
         return [(name, found[0].settings.kind, -math.inf, math.inf)]
     ends = [*(part.start for part in found[1:]), math.inf]
     return [(f"{name}, {p.settings.kind}", p.settings.kind, p.start, end) for p, end in zip(found, ends, strict=True)]
 
 
-def _rudder(allocation: Allocation, fins: Array) -> Array:
-    return np.array([allocation.effective(angles)[0] for angles in fins.tolist()])
+def _rudder(actuation: FinsAndShaft, channels: Array) -> Array:
+    return np.array([actuation.effective(row).rudder for row in channels.tolist()])
 
 
-def _places(log: TrialLog, heading: Signal, transponder: tuple[float, float, float]) -> tuple[Array, Array]:
+def _places(log: VehicleLog, heading: Signal, transponder: tuple[float, float, float]) -> tuple[Array, Array]:
     """North and east (n, 2) [m] of the body's origin by fixes that arrived, in order of their stamps (n,) [s]."""
+    if "usbl" not in log:
+        return np.empty((0, 2)), np.empty(0)
     arrived = np.isfinite(log["usbl"]["received"])
     stamps, first = np.unique(log["usbl"]["time"][arrived], return_index=True)
     places = fixes(log)[arrived][first]
@@ -88,12 +92,11 @@ def _places(log: TrialLog, heading: Signal, transponder: tuple[float, float, flo
     return places - np.column_stack([arm.real, arm.imag]), stamps
 
 
-def _deviations(plan: scenario.Scenario, places: Array) -> dict[str, float]:
-    """Of one reading, as the scenario's data sheets say."""
+def _deviations(plan: VehicleSettings, places: Array) -> dict[str, float]:
+    """Standard deviations of one reading, as the scenario's data sheets say; places are seen from the dock."""
     sensors = plan.sensors
-    distance = max(float(np.median(np.hypot(*places.T))), 1e-3) if len(places) else 1.0
-    ranges, sds = np.log(np.array(sensors.usbl.noise)).T
-    fix = sensors.usbl.noise_scale * math.exp(float(np.interp(math.log(distance), ranges, sds)))
+    distance = float(np.median(np.hypot(*places.T))) if len(places) else 1.0
+    fix = sensors.usbl.sigma(distance)
     given = {
         "north": fix, "east": fix,
         "heading": math.radians(sensors.compass.heading_noise_deg),
@@ -104,11 +107,12 @@ def _deviations(plan: scenario.Scenario, places: Array) -> dict[str, float]:
     return {quantity: deviation for quantity, deviation in given.items() if deviation > 0.0}
 
 
-def _barred(log: TrialLog) -> tuple[tuple[float, float], ...]:
+def _excluded(log: VehicleLog) -> tuple[tuple[float, float], ...]:
     """Spans in which the vehicle is steep, goes astern, or has come to the dock."""
-    compass, feedback, guidance = log["compass"], log["feedback"], log["guidance"]
+    compass, feedback, mission = log["compass"], log["feedback"], log["mission"]
     spans = steep(Signal(times=compass["time"], values=compass["value"][:, 1]))
     spans += stretches(feedback["time"], feedback["value"][:, -1] < 0.0)
-    ends = [guidance["time"][guidance["phase"] == Phase.DOCKED], log["contact"]["time"]]
+    docked = mission["phase"] == (log.phases.index("docked") if "docked" in log.phases else -1)
+    ends = [mission["time"][docked], log["contact"]["time"]]
     first = min((float(times[0]) for times in ends if len(times)), default=math.inf)
     return (*spans, *([(first - MARGIN, math.inf)] if math.isfinite(first) else []))

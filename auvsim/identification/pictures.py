@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from auvsim.analysis.style import dress
 from auvsim.identification.identifiability import WEAK, sizes
-from auvsim.identification.judgement import Judged, root_mean_square
+from auvsim.identification.judgement import HoldoutResult, root_mean_square
 from auvsim.identification.pipeline import Identification
 from auvsim.identification.records import MEASURED
 from auvsim.physics.planar_sets import UNITS
@@ -53,12 +53,12 @@ def overview(found: Identification) -> Figure:
     return figure
 
 
-def hardest(found: Identification) -> Judged:
+def hardest(found: Identification) -> HoldoutResult:
     """The held-out record that the fit predicts worst: the one to look at."""
     return max(found.judged, key=lambda judged: judged.share)
 
 
-def states_panels(figure: Any, judged: Judged) -> None:
+def states_panels(figure: Any, judged: HoldoutResult) -> None:
     """Figure 4: rudder, heading and velocities over time, predicted open loop from the first start on."""
     axes: Any = figure.subplots(5, 1, sharex=True, height_ratios=(0.6, 1, 1, 1, 1))
     fit, start, first = judged.fit[0], judged.start[0], judged.firsts[0]
@@ -97,7 +97,7 @@ def _limits(low: float, high: float, least: float = 1e-3) -> tuple[float, float]
     return low - margin, high + margin
 
 
-def track_panel(axes: Axes, judged: Judged) -> None:
+def track_panel(axes: Axes, judged: HoldoutResult) -> None:
     """Figure 5: the tracks of the same prediction."""
     fit, start, first = judged.fit[0], judged.start[0], judged.firsts[0]
     fixes = judged.record.measured[first : first + len(fit.times), :2]

@@ -12,7 +12,7 @@ from auvsim.identification import checks, judgement
 from auvsim.identification.constraints import SIGNS, limits, prior_information
 from auvsim.identification.fit import DEFAULT_FREE, Fit, invert
 from auvsim.identification.identifiability import Identifiability, assess, likelihood_interval, sizes
-from auvsim.identification.judgement import Judged
+from auvsim.identification.judgement import HoldoutResult
 from auvsim.identification.least_squares import fit_least_squares
 from auvsim.identification.prediction_error import PredictionErrorOptions, fit_prediction_error
 from auvsim.identification.records import MEASURED, Readings, Record
@@ -25,7 +25,7 @@ from estimators.planar.model import SURGE_LIMIT, PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
 LENGTH = 20.0  # of the segments fitted [s]
-PRIOR = 0.5  # relative deviation from the start that is believed where the data are blind
+PRIOR = 0.5  # relative standard deviation of the prior about the start, where the data alone cannot tell
 PROBABILITY = 0.95
 PROFILED = 4  # weak parameters whose likelihood is followed: each takes some dozens of fits
 NOISY = 1.1  # residuals beyond this many deviations show noise of the process
@@ -55,7 +55,7 @@ class Identification:
     identifiability: Identifiability
     intervals: dict[str, tuple[float, float]]  # 95 % of the free parameters; infinite where open
     profiled: tuple[str, ...]  # those of them by the ratio of likelihoods
-    judged: tuple[Judged, ...]  # of each held-out record
+    judged: tuple[HoldoutResult, ...]  # of each held-out record
     verdicts: tuple[Verdict, ...]
     readings: Readings
     kept: int = -1  # which of the fits is the result
@@ -126,11 +126,11 @@ def identify(
     if not judging:
         records, judging, said = judgement.choose(records)
     checks.records(records, start)
-    fits, weighed, believed, notes = _fits(records, start, free, steps, say)
+    fits, weighed, prior_on, notes = _fits(records, start, free, steps, say)
     kept, why = _kept(records, start, fits)
     notes += why
     fit = fits[kept]
-    assessed = assess(_by_data_alone(fit, believed) if believed else fit)
+    assessed = assess(_by_data_alone(fit, prior_on) if prior_on else fit)
     intervals, profiled = _intervals(weighed, fits, fit, assessed, say)
     say("predicting what was held out", 0.95)
     judged = tuple(judgement.judge(record, start, fit.parameters) for record in judging)
@@ -161,7 +161,7 @@ def _speed(records: Sequence[Record], vehicle: str) -> float:
     if not records:
         return 1.0
     shaft = float(np.mean(np.concatenate([r.inputs[:, 1] for r in records])))
-    limit = library.vehicle(vehicle).shaft_limit
+    limit = library.vehicle(vehicle).actuation.shaft_limit
     return float(np.clip(steady_surge(fit_planar_model(vehicle, 1.0).parameters, min(shaft, limit)), 0.2, 10.0))
 
 
@@ -174,12 +174,12 @@ def _fits(
 ) -> tuple[list[Fit], Sequence[Record], tuple[str, ...], list[Verdict]]:
     """The fit of each step, each from the one before; and what segments found on the way.
 
-    That is the records as they are weighed, the parameters whose start was believed, and verdicts that say so.
+    That is the records as they are weighed, the parameters with a prior about the start, and verdicts that say so.
     """
     weighed: Sequence[Record] = records
     fits: list[Fit] = []
     notes: list[Verdict] = []
-    believed: tuple[str, ...] = ()
+    prior_on: tuple[str, ...] = ()
     if "least squares" in steps:
         say("least squares", 0.0)
         fits.append(fit_least_squares(records, start, free))
@@ -188,19 +188,19 @@ def _fits(
         found, weighed = _reweighted(records, start, free)
         blind = assess(found).blind
         if blind or not found.converged:
-            believed = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
+            prior_on = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
             why = f"cannot tell {'; '.join(c.text for c in blind)}" if blind else "lead to no end"
-            text = f"the data alone {why}: the start of {', '.join(believed)} was believed to within {PRIOR:.0%}"
+            text = f"the data alone {why}: a prior of {PRIOR:.0%} about the start was put on {', '.join(prior_on)}"
             notes.append(Verdict(good=False, text=f"{text}, and decides these"))
-            options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, believed=believed)
+            options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, prior_on=prior_on)
             found = fit_segments(weighed, start, free, options)
         fits.append(found)
     if "prediction error" in steps:
         say("prediction error", 0.3)
         guess = fits[-1].parameters if "segments" in steps else None
-        held = PredictionErrorOptions(signs=True, prior=PRIOR if believed else None, believed=believed)
+        held = PredictionErrorOptions(signs=True, prior=PRIOR if prior_on else None, prior_on=prior_on)
         fits.append(fit_prediction_error(records, start, free, held, guess=guess))
-    return fits, weighed, believed, notes
+    return fits, weighed, prior_on, notes
 
 
 def _reweighted(records: Sequence[Record], start: PlanarParameters, free: Sequence[str]) -> tuple[Fit, list[Record]]:
@@ -240,10 +240,10 @@ def _kept(records: Sequence[Record], start: PlanarParameters, fits: Sequence[Fit
     return best, [Verdict(good=True, text=text)]
 
 
-def _by_data_alone(fit: Fit, believed: Sequence[str]) -> Fit:
+def _by_data_alone(fit: Fit, prior_on: Sequence[str]) -> Fit:
     """The same with the covariance that the data alone would give."""
     centre = np.array([getattr(fit.start, name) for name in fit.free])
-    prior = prior_information(centre, fit.free, PRIOR, believed)
+    prior = prior_information(centre, fit.free, PRIOR, prior_on)
     known = np.isfinite(fit.deviations) & (fit.deviations > 0.0)
     information = np.zeros_like(fit.covariance)
     information[np.ix_(known, known)] = np.linalg.inv(fit.covariance[np.ix_(known, known)])
@@ -335,7 +335,7 @@ def _judgement(found: Identification, seconds: float) -> Verdict:
     return Verdict(good=False, text=f"{text}; keep the start, or log other manoeuvres")
 
 
-def _shares(judged: Judged) -> str:
+def _shares(judged: HoldoutResult) -> str:
     return f"{judged.start_share:.2%} against {judged.share:.2%}"
 
 

@@ -42,7 +42,7 @@ _STRIDE = 2.0  # longest step of a density's logarithm: one that falls to nothin
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class PredictionErrorOptions:
-    """What the filter believes, and which of its noises are fitted."""
+    """Settings of the filter, and which of its noises are fitted."""
 
     noise: tuple[str, ...] = ("surge", "sway", "yaw_rate")  # densities that are fitted, of NOISES
     densities: tuple[float, ...] = (0.0, 0.0, 0.0, 1e-4, 1e-4, 1e-5)  # where they start (6,), units as Fit.noise
@@ -50,7 +50,7 @@ class PredictionErrorOptions:
     nuisances: Nuisances = field(default_factory=Nuisances)
     signs: bool = False  # as in SegmentOptions
     prior: float | None = None  # as in SegmentOptions
-    believed: tuple[str, ...] | None = None  # as in SegmentOptions
+    prior_on: tuple[str, ...] | None = None  # as in SegmentOptions
     # Longest step of the filter's midpoint rule [s]: in steps of 0.1 s its error of (0.1 lambda)^2 / 6, 0.3 % at a yaw
     # that decays with lambda = 1.3 1/s, would go into the parameters.
     max_substep: float = 0.05
@@ -92,7 +92,7 @@ class Likelihood:
         self.trust = np.zeros(len(self.low))  # of the weak prior
         self.centre = np.zeros(len(self.low))
         self.centre[: len(free)] = self._vector[self.indices]
-        self.trust[: len(free)] = prior_information(self.centre[: len(free)], free, options.prior, options.believed)
+        self.trust[: len(free)] = prior_information(self.centre[: len(free)], free, options.prior, options.prior_on)
 
     def split(self, unknowns: Array) -> tuple[PlanarParameters, Array]:
         """Parameters and densities (12,) of the filter's states."""
@@ -204,7 +204,7 @@ def fit_prediction_error(
         records: What was measured.
         start: What is not free, the middle of the prior, and what the fit is compared with.
         free: Names of the free ones.
-        options: What the filter believes.
+        options: Settings of the filter.
         guess: Where to begin, such as a fit of segments; where the start or least squares are likelier, it is there.
 
     Raises:

@@ -35,7 +35,7 @@ def read(
     for path in paths:
         sources.append(Source(file=path.name, sha256=_hash(path)))
         ones, more = _signals(path, mapping, vehicle)
-        known = () if limits is None else (limits.allocation.limit, limits.shaft_limit)
+        known = () if limits is None else (limits.actuation.fin_limit, limits.actuation.shaft_limit)
         more += checks.signals(ones, *known)
         notes += more
         for one in ones:

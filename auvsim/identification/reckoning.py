@@ -11,7 +11,7 @@ WINDOW = 9  # fixes judged together: a steady current and speed over them are go
 _SWEEPS = 20  # reweighted least squares come to the least absolute sum within these
 
 
-def strays(signals: Mapping[str, tuple[Array, Array]], deviation: float) -> NDArray[np.bool_]:
+def outliers(signals: Mapping[str, tuple[Array, Array]], deviation: float) -> NDArray[np.bool_]:
     """Which positions (n,) lie farther than six deviations from where their neighbours and the motion put them.
 
     In each window position is that of dead reckoning, turned and stretched, plus a steady drift, by least absolute

@@ -19,7 +19,7 @@ class Record:
     # (n, 8) in the order of MEASURED, NaN where nothing was measured; positions [m], heading [rad] (not wrapped),
     # velocities through the water (surge, sway) [m/s], yaw rate [rad/s], velocity over ground in the body's axes [m/s]
     measured: Array
-    deviations: Array  # (8,) standard deviation of each, as believed [same units]
+    deviations: Array  # (8,) assumed standard deviation of each [same units]
     current: Array | None = None  # (2,) north, east [m/s] where it is known; None: a nuisance parameter of the record
     kind: str = ""  # of the manoeuvre, where it is known
     wind: Array | None = None  # (n, 2) apparent wind, air past the vehicle towards its bow and to starboard [m/s]

@@ -239,13 +239,13 @@ def eliminate(H, g, damping):
         damping: Share of the diagonal added to that of the first states.
 
     Returns:
-        Sums over the segments, H (t, t) and g (t,), what brings the first states back, (s, 6, t + 1), and whether all
-        could be eliminated.
+        Sums over the segments, H (t, t) and g (t,), the back-substitution of the first states,
+        (s, 6, t + 1), and whether all could be eliminated.
     """
     count, width = g.shape
     t = width - 6
     total, gradient = np.zeros((t, t)), np.zeros(t)
-    back = np.empty((count, 6, t + 1))
+    back_substitution = np.empty((count, 6, t + 1))
     column = np.empty(6)
     block = np.empty((6, 6))
     for s in range(count):
@@ -255,27 +255,27 @@ def eliminate(H, g, damping):
             block[i, i] *= 1.0 + damping + ROUNDING
         L, positive = factor(block)
         if not positive:
-            return total, gradient, back, False
+            return total, gradient, back_substitution, False
         for j in range(t + 1):
             for i in range(6):
                 column[i] = H[s, i, 6 + j] if j < t else g[s, i]
             solve(L, column)
             for i in range(6):
-                back[s, i, j] = column[i]
+                back_substitution[s, i, j] = column[i]
         for i in range(t):
             for j in range(i, t):
                 correction = 0.0
                 for a in range(6):
-                    correction += H[s, a, 6 + i] * back[s, a, j]
+                    correction += H[s, a, 6 + i] * back_substitution[s, a, j]
                 total[i, j] += H[s, 6 + i, 6 + j] - correction
             correction = 0.0
             for a in range(6):
-                correction += H[s, a, 6 + i] * back[s, a, t]
+                correction += H[s, a, 6 + i] * back_substitution[s, a, t]
             gradient[i] += g[s, 6 + i] - correction
     for i in range(t):
         for j in range(i):
             total[i, j] = total[j, i]
-    return total, gradient, back, True
+    return total, gradient, back_substitution, True
 
 
 @compiled

@@ -38,7 +38,7 @@ class SegmentOptions:
     threshold: float = 2.5  # of a robust loss, in deviations
     signs: bool = False  # keeps the parameters of constraints.SIGNS on their side of zero
     prior: float | None = None  # weak prior: the start, with this relative deviation
-    believed: tuple[str, ...] | None = None  # parameters that it holds; None: all
+    prior_on: tuple[str, ...] | None = None  # parameters with a prior; None: all
     max_iterations: int = 50
     tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
 
@@ -84,7 +84,7 @@ class Point(NamedTuple):
     nuisances: Array  # (records, 6)
     starts: list[Array]  # of each record (s, 6)
     cost: float
-    folds: list[tuple[Array, Array]]  # of each record: matrices and gradients of `segment_loops.normal_equations`
+    normal_equations: list[tuple[Array, Array]]  # matrices and gradients of each record
     residuals: list[Array]  # of each record (n, 8)
 
 
@@ -128,7 +128,7 @@ class Problem:
             if record.current is not None:
                 self._expected[r, :2] = record.current
         self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
-        own = prior_information(self._vector[self.indices], free, options.prior, options.believed)
+        own = prior_information(self._vector[self.indices], free, options.prior, options.prior_on)
         self._prior = np.diag(own) if prior is None else prior
         self._held = 1.0 / first**2
         self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
@@ -142,7 +142,7 @@ class Problem:
         aside = values - self._vector[self.indices]
         cost = 0.5 * float(aside @ self._prior @ aside)
         cost += 0.5 * float(np.sum(self._trust * (nuisances - self._expected) ** 2))
-        folds, residuals = [], []
+        normal_equations, residuals = [], []
         if not self._admissible(p):
             cost = np.inf
         for cut, own, first in zip(self.cuts, nuisances, starts, strict=True):
@@ -156,23 +156,23 @@ class Problem:
             cost += part + 0.5 * float(np.sum(away**2 * self._held))
             H[:, range(6), range(6)] += self._held
             g[:, :6] += away * self._held
-            folds.append((H, g))
+            normal_equations.append((H, g))
             residuals.append(e)
-        return Point(values, nuisances, starts, cost, folds, residuals)
+        return Point(values, nuisances, starts, cost, normal_equations, residuals)
 
     def reduced(self, point: Point, damping: float) -> tuple[Array, Array, list[Array]]:
-        """Equations (T, T) and (T,) of parameters, then active nuisances; and what brings back the first states.
+        """Equations (T, T) and (T,) of parameters, then active nuisances; back-substitution of the first states.
 
         Raises:
             InputError: The first state of a segment cannot be eliminated.
         """
         k = len(self.free)
         size = k + int(self.active.sum())
-        total, gradient, backs = np.zeros((size, size)), np.zeros(size), []
+        total, gradient, back_substitution = np.zeros((size, size)), np.zeros(size), []
         total[:k, :k] += self._prior
         gradient[:k] += self._prior @ (self._vector[self.indices] - point.values)
-        for r, (H, g) in enumerate(point.folds):
-            part, descent, back, solved = self._loops.eliminate(H, g, damping)
+        for r, (H, g) in enumerate(point.normal_equations):
+            part, descent, matrix, solved = self._loops.eliminate(H, g, damping)
             if not solved:
                 raise InputError(f"record {self.cuts[r].record.name}: a segment does not show its first state")
             places, here = self._places(r)
@@ -181,17 +181,17 @@ class Problem:
             own = places[k:]
             total[own, own] += self._trust[r, self.active[r]]
             gradient[own] += (self._trust[r] * (self._expected[r] - point.nuisances[r]))[self.active[r]]
-            backs.append(back)
-        return total, gradient, backs
+            back_substitution.append(matrix)
+        return total, gradient, back_substitution
 
-    def moved(self, point: Point, step: Array, backs: list[Array]) -> Point:
+    def moved(self, point: Point, step: Array, back_substitution: list[Array]) -> Point:
         """The unknowns after a step (T,) of parameters and nuisances."""
         k = len(self.free)
         nuisances, starts = point.nuisances.copy(), []
-        for r, back in enumerate(backs):
+        for r, matrix in enumerate(back_substitution):
             places, here = self._places(r)
             nuisances[r, self.active[r]] += step[places[k:]]
-            starts.append(point.starts[r] + back[:, :, -1] - back[:, :, here] @ step[places])
+            starts.append(point.starts[r] + matrix[:, :, -1] - matrix[:, :, here] @ step[places])
         return self.at(point.values + step[:k], nuisances, starts)
 
     def _places(self, r: int) -> tuple[Indices, Indices]:
@@ -222,11 +222,12 @@ def minimise(problem: Problem, point: Point, tolerance: float, fixed: Mask | Non
     if not np.isfinite(point.cost):
         return point, 0, False
     for iteration in range(1, problem.options.max_iterations + 1):
-        H, g, backs = problem.reduced(point, damping)
+        H, g, back_substitution = problem.reduced(point, damping)
         step = bounded_step(H, g, damping, low - point.values, high - point.values)
-        eliminated = sum(np.sum(g[:, :6] * back[:, :, -1]) for (_, g), back in zip(point.folds, backs, strict=True))
+        pairs = zip(point.normal_equations, back_substitution, strict=True)
+        eliminated = sum(np.sum(g[:, :6] * matrix[:, :, -1]) for (_, g), matrix in pairs)
         gain = 0.5 * float(g @ step + eliminated)
-        trial = problem.moved(point, step, backs)
+        trial = problem.moved(point, step, back_substitution)
         last = gain < tolerance and damping <= 1e-3
         if not trial.cost < point.cost:
             if last or damping > 1e12:
@@ -261,7 +262,7 @@ def _cut(record: Record, length: float, states: Array) -> _Cut:
 
 
 def active_nuisances(record: Record, deviations: Array) -> Mask:
-    """Which nuisances (6,) a record has: those that are believed possible and touch a channel that was measured."""
+    """Which nuisances (6,) a record has: those with a prior deviation that touch a channel that was measured."""
     north, east, heading, surge, sway, rate, over_u, over_v = (
         bool(np.isfinite(values).any()) for values in record.measured.T
     )

@@ -33,7 +33,7 @@ def fit_segments(
 
     It goes down from the start. Where that does not converge, or ends higher than the sensors' noise explains, it goes
     down from least squares too, then from a fit of other segments, and keeps the lowest end. The covariance is that of
-    Gauss and Newton, for the deviations that the records believe.
+    Gauss and Newton, for the deviations that the records assume.
 
     Raises:
         InputError: Records, names or options that cannot be used.
@@ -88,7 +88,7 @@ def _down(problem: Problem, values: Array) -> tuple[Point, int, bool]:
 
 
 def _unlikely(point: Point) -> bool:
-    """Whether the sum of squares is more than noise of the size believed would leave in any but one of a million."""
+    """Whether the sum of squares is more than noise of the assumed size would leave in any but one of a million."""
     samples = sum(int(np.isfinite(e).sum()) for e in point.residuals)
     return 2.0 * point.cost > samples + _UNLIKELY * math.sqrt(2.0 * samples)
 

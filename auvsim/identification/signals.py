@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from auvsim.identification.reckoning import strays
+from auvsim.identification.reckoning import outliers
 from auvsim.identification.records import MEASURED, Record
 from estimators.core.types import Array
 
@@ -44,7 +44,7 @@ class Signals:
     signals: Mapping[str, Signal]  # by INPUTS and MEASURED
     deviations: Mapping[str, float] = field(default_factory=dict)  # of one sample, by MEASURED; else DEVIATIONS
     current: Array | None = None  # (2,) north, east [m/s]
-    barred: tuple[tuple[float, float], ...] = ()  # spans of time in which the vehicle was no planar one [s]
+    excluded: tuple[tuple[float, float], ...] = ()  # spans of time in which the vehicle was no planar one [s]
 
     def deviation(self, quantity: str) -> float:
         """Standard deviation of one sample."""
@@ -111,7 +111,7 @@ def _without_strays(signals: Signals) -> tuple[Signals, list[str]]:
     given = signals.signals
     if not {"north", "east"} <= given.keys():
         return signals, []
-    wrong = strays({name: (s.times, s.values) for name, s in given.items()}, signals.deviation("north"))
+    wrong = outliers({name: (s.times, s.values) for name, s in given.items()}, signals.deviation("north"))
     if not wrong.any():
         return signals, []
     kept = {
@@ -120,14 +120,14 @@ def _without_strays(signals: Signals) -> tuple[Signals, list[str]]:
     note = f"{signals.name}: {wrong.sum()} of {len(wrong)} positions dropped, far from where the others put the vehicle"
     changed = Signals(
         name=signals.name, kind=signals.kind, signals={**given, **kept}, deviations=signals.deviations,
-        current=signals.current, barred=signals.barred,
+        current=signals.current, excluded=signals.excluded,
     )  # fmt: skip
     return changed, [note]
 
 
 def _spans(signals: Signals) -> Iterator[tuple[float, float]]:
     """Where both inputs are there without a gap and nothing bars them."""
-    closed = [(low, high) for low, high in signals.barred if high > low]
+    closed = [(low, high) for low, high in signals.excluded if high > low]
     start, stop = -math.inf, math.inf
     for name in INPUTS:
         times = signals.signals[name].times

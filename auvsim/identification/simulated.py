@@ -1,4 +1,4 @@
-"""Records of planar vehicles whose parameters are known: what a fit is tested on before it is believed."""
+"""Records of planar vehicles whose parameters are known: a test of fits against the truth."""
 
 import math
 from dataclasses import dataclass, field

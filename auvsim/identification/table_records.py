@@ -171,7 +171,7 @@ def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, 
         deviations.setdefault(quantity, noise(found[quantity], quantity))
     result = Signals(
         name=label, kind=piece.kind, signals=found, deviations=deviations, current=_current(found),
-        barred=tuple(steep(found["pitch"])) if "pitch" in found else (),
+        excluded=tuple(steep(found["pitch"])) if "pitch" in found else (),
     )  # fmt: skip
     return result, notes
 

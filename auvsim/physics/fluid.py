@@ -5,12 +5,18 @@ After velocities are known MuJoCo calls `mjcb_passive`. For every body with a co
 the joint-space inertia `mjData.M`, which it then factorises again. All that follows in the step (contact, implicit
 integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in free motion and in contact.
 
-With v_r the hull's velocity relative to the water, omega its angular velocity and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is
-`-M_A J qacc` (in M) plus `M_A [a_c + omega x v_r - (d(J)/dt qvel); 0]`. The water's own pressure adds `rho V a_c` at
-the centre of buoyancy (Auton, Hunt & Prud'homme 1988).
+With v_r the hull's velocity relative to the water, omega its angular velocity, G the gradient of the water's velocity
+and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is `-M_A J qacc` (in M) plus
+`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull enters other water as it moves. A gradient also takes
+`G' p` from the force, p being the linear part of the impulse `M_A nu_r` (Galper & Miloh 1995, J. Fluid Mech. 295), and
+the water's own pressure adds `rho V a_c` at the centre of buoyancy. Force and moment are then those of the kinetic
+energy `nu_r' M_A nu_r / 2`, exact in irrotational strain but for moments of the order of M_A G^2. In rotational shear
+they are an approximation, which has the lift coefficient of a sphere, 1/2 (Auton, Hunt & Prud'homme 1988).
 
-The water is a local expansion in `mjData.userdata`, one slot of `WATER` numbers a vehicle:
-`[time, place (3), velocity (3), dv/dt (3), dv_i/dx_j (9)]` in MuJoCo's world axes. A reset zeroes it.
+The water is a local expansion in `mjData.userdata`, one slot per vehicle (see `water_slot`). Where it has a surface,
+buoyancy is that of the strips under water; the other forces of a hull, and its added mass, fade with the share of its
+volume that is under water, those of fins, propellers and thrusters with the share of their area. What a breaking
+surface adds (slamming, ventilation, waves made) is left out.
 """
 
 import ctypes
@@ -26,24 +32,34 @@ from numba.core.caching import FunctionCache
 
 from auvsim.physics import mujoco_structs
 from auvsim.physics.forces import (
+    CHANNEL,
     DENSITY,
+    FIN,
     FIN_KIND,
     HULL,
     HULL_KIND,
     PROPELLER,
     PROPELLER_KIND,
     SLOT,
+    THRUSTER,
+    THRUSTER_KIND,
     added_momentum,
     fin_force,
     hull_force,
     propeller_force,
+    shaft_brake,
+    thruster_force,
 )
 from auvsim.physics.pointers import integers, load_pointer, numbers, scratch
+from auvsim.physics.submergence import share_under, volume_out
+from auvsim.physics.water_slot import WATER
 
-WATER = 19  # numbers in a water slot
+__all__ = ["WATER", "install", "is_warm"]
 
 _MASS, _VOLUME = HULL["added_mass"][0], HULL["displaced_volume"][0]
-_SWIRL = PROPELLER["swirl_recovery"][0]
+_SWIRL, _DIAMETER = PROPELLER["swirl_recovery"][0], PROPELLER["diameter"][0]
+_AREA = FIN["area"][0]
+_SIZE, _REACTION = THRUSTER["size"][0], THRUSTER["reaction"][0]
 _scratch = scratch(42)  # a hull's Jacobian (6, 6) and a row of its product
 
 
@@ -114,9 +130,13 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
         p0 += q * (cdof[d + 3] + cdof[d + 1] * a2 - cdof[d + 2] * a1)
         p1 += q * (cdof[d + 4] + cdof[d + 2] * a0 - cdof[d] * a2)
         p2 += q * (cdof[d + 5] + cdof[d] * a1 - cdof[d + 1] * a0)
-    k0 = b0 + o1 * u2 - o2 * u1 - (o1 * p2 - o2 * p1)
-    k1 = b1 + o2 * u0 - o0 * u2 - (o2 * p0 - o0 * p2)
-    k2 = b2 + o0 * u1 - o1 * u0 - (o0 * p1 - o1 * p0)
+    # Change of the water's velocity along the hull's path, dv/dt + (x_dot . grad) v = Dv/Dt + (v_r . grad) v.
+    h0 = b0 + (water[g] * u0 + water[g + 1] * u1 + water[g + 2] * u2)
+    h1 = b1 + (water[g + 3] * u0 + water[g + 4] * u1 + water[g + 5] * u2)
+    h2 = b2 + (water[g + 6] * u0 + water[g + 7] * u1 + water[g + 8] * u2)
+    k0 = h0 + o1 * u2 - o2 * u1 - (o1 * p2 - o2 * p1)
+    k1 = h1 + o2 * u0 - o0 * u2 - (o2 * p0 - o0 * p2)
+    k2 = h2 + o0 * u1 - o1 * u0 - (o0 * p1 - o1 * p0)
     n0 = r00 * k0 + r10 * k1 + r20 * k2
     n1 = r01 * k0 + r11 * k1 + r21 * k2
     n2 = r02 * k0 + r12 * k1 + r22 * k2
@@ -127,14 +147,27 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
     m1 += added_momentum(c, o, 4, n0, n1, n2, 0.0, 0.0, 0.0)
     m2 += added_momentum(c, o, 5, n0, n1, n2, 0.0, 0.0, 0.0)
 
-    # To world axes; buoyancy and the water's own pressure gradient act at the hull's origin.
-    mass = c[o + DENSITY] * c[o + _VOLUME]
-    F0 = r00 * f0 + r01 * f1 + r02 * f2 + mass * (b0 - gravity[0])
-    F1 = r10 * f0 + r11 * f1 + r12 * f2 + mass * (b1 - gravity[1])
-    F2 = r20 * f0 + r21 * f1 + r22 * f2 + mass * (b2 - gravity[2])
-    T0 = r00 * m0 + r01 * m1 + r02 * m2 + a1 * F2 - a2 * F1
-    T1 = r10 * m0 + r11 * m1 + r12 * m2 + a2 * F0 - a0 * F2
-    T2 = r20 * m0 + r21 * m1 + r22 * m2 + a0 * F1 - a1 * F0
+    # The impulse in strained water, of which G' p is taken from the force.
+    i0 = added_momentum(c, o, 0, v0, v1, v2, w0, w1, w2)
+    i1 = added_momentum(c, o, 1, v0, v1, v2, w0, w1, w2)
+    i2 = added_momentum(c, o, 2, v0, v1, v2, w0, w1, w2)
+    P0 = r00 * i0 + r01 * i1 + r02 * i2
+    P1 = r10 * i0 + r11 * i1 + r12 * i2
+    P2 = r20 * i0 + r21 * i1 + r22 * i2
+
+    # To world axes, as far as the hull is under water.
+    out, out_moment = volume_out(c, o, water, slot, time, x0, x1, x2, r00, r10, r20)
+    share = 1.0 - out / c[o + _VOLUME] if out > 0.0 else 1.0
+    F0 = share * (r00 * f0 + r01 * f1 + r02 * f2 - (water[g] * P0 + water[g + 3] * P1 + water[g + 6] * P2))
+    F1 = share * (r10 * f0 + r11 * f1 + r12 * f2 - (water[g + 1] * P0 + water[g + 4] * P1 + water[g + 7] * P2))
+    F2 = share * (r20 * f0 + r21 * f1 + r22 * f2 - (water[g + 2] * P0 + water[g + 5] * P1 + water[g + 8] * P2))
+    # Buoyancy and the water's own pressure gradient act at the hull's origin, less at the strips that are out.
+    n0, n1, n2 = b0 - gravity[0], b1 - gravity[1], b2 - gravity[2]
+    mass, arm = c[o + DENSITY] * (c[o + _VOLUME] - out), c[o + DENSITY] * out_moment
+    F0, F1, F2 = F0 + mass * n0, F1 + mass * n1, F2 + mass * n2
+    T0 = share * (r00 * m0 + r01 * m1 + r02 * m2) + a1 * F2 - a2 * F1 - arm * (r10 * n2 - r20 * n1)
+    T1 = share * (r10 * m0 + r11 * m1 + r12 * m2) + a2 * F0 - a0 * F2 - arm * (r20 * n0 - r00 * n2)
+    T2 = share * (r20 * m0 + r21 * m1 + r22 * m2) + a0 * F1 - a1 * F0 - arm * (r00 * n1 - r10 * n0)
     _apply(qfrc, cdof, parent, dof0 + 5, F0, F1, F2, T0, T1, T2)
 
     # J: column i is the hull's velocity, in its axes, for unit speed of joint axis i.
@@ -160,17 +193,21 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
             total = 0.0
             for n in range(6):
                 total += J[36 + n] * J[6 * n + j]
-            M[row + j] += total
+            M[row + j] += share * total
 
 
 @njit(cache=True, error_model="numpy")
-def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, parent, dof, qfrc):
-    """Forces of a fin or a propeller, from the local velocity at its origin; `hinge` is the shaft's rate [rad/s]."""
+def _part(kind, c, o, body, water, time, xpos, xmat, cvel, drive, com, cdof, parent, dof, qfrc):
+    """Forces of a fin, propeller or thruster, from the local velocity at its origin.
+
+    `drive` is a shaft's rate [rad/s], or a thruster's command.
+    """
     R = 9 * body
     x0, x1, x2 = xpos[3 * body], xpos[3 * body + 1], xpos[3 * body + 2]
     a0, a1, a2 = x0 - com[0], x1 - com[1], x2 - com[2]
     o0, o1, o2 = cvel[6 * body], cvel[6 * body + 1], cvel[6 * body + 2]
-    c0, c1, c2 = _water_at(water, int(c[o + SLOT]), time, x0, x1, x2)
+    slot = int(c[o + SLOT])
+    c0, c1, c2 = _water_at(water, slot, time, x0, x1, x2)
     u0 = cvel[6 * body + 3] + o1 * a2 - o2 * a1 - c0
     u1 = cvel[6 * body + 4] + o2 * a0 - o0 * a2 - c1
     u2 = cvel[6 * body + 5] + o0 * a1 - o1 * a0 - c2
@@ -178,15 +215,30 @@ def _surface(kind, c, o, body, water, time, xpos, xmat, cvel, hinge, com, cdof, 
     if kind == FIN_KIND:
         across = xmat[R + 1] * u0 + xmat[R + 4] * u1 + xmat[R + 7] * u2
         chord, normal = fin_force(c, o, ahead, across)
+        share = share_under(water, slot, time, x0, x1, x2, 0.5 * math.sqrt(c[o + _AREA]))
+        chord, normal = share * chord, share * normal
         F0 = xmat[R] * chord + xmat[R + 1] * normal
         F1 = xmat[R + 3] * chord + xmat[R + 4] * normal
         F2 = xmat[R + 6] * chord + xmat[R + 7] * normal
         _apply(qfrc, cdof, parent, dof, F0, F1, F2, a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0)
         return
-    thrust, torque = propeller_force(c, o, ahead, hinge / (2.0 * math.pi))
+    if kind == THRUSTER_KIND:
+        across2 = max(u0 * u0 + u1 * u1 + u2 * u2 - ahead * ahead, 0.0)
+        thrust = thruster_force(c, o, ahead, across2, drive)
+        thrust *= share_under(water, slot, time, x0, x1, x2, 0.5 * c[o + _SIZE])
+        F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
+        torque = -c[o + _REACTION] * thrust
+        T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
+        T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque
+        _apply(qfrc, cdof, parent, dof, F0, F1, F2, T0, T1, T2)
+        return
+    n = drive / (2.0 * math.pi)
+    thrust, torque = propeller_force(c, o, ahead, n)
+    share = share_under(water, slot, time, x0, x1, x2, 0.5 * c[o + _DIAMETER])
+    thrust, torque = share * thrust, share * torque
     F0, F1, F2 = xmat[R] * thrust, xmat[R + 3] * thrust, xmat[R + 6] * thrust
     T0, T1, T2 = a1 * F2 - a2 * F1, a2 * F0 - a0 * F2, a0 * F1 - a1 * F0
-    qfrc[dof] += torque
+    qfrc[dof] += torque + shaft_brake(c, o, ahead, n)
     # The hull feels the torque less what the tail recovers from the swirl.
     torque *= 1.0 - c[o + _SWIRL]
     T0, T1, T2 = T0 + xmat[R] * torque, T1 + xmat[R + 3] * torque, T2 + xmat[R + 6] * torque
@@ -206,6 +258,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
     d_time, d_userdata, d_xpos, d_xmat = data_at["time"], data_at["userdata"], data_at["xpos"], data_at["xmat"]
     d_cvel, d_com, d_cdof = data_at["cvel"], data_at["subtree_com"], data_at["cdof"]
     d_qfrc, d_M, d_qvel = data_at["qfrc_passive"], data_at["M"], data_at["qvel"]
+    d_act, d_ctrl = data_at["act"], data_at["ctrl"]
 
     @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
     def passive(m, d):
@@ -223,6 +276,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
         coms, cdof = load_pointer(d + d_com), numbers(load_pointer(d + d_cdof))
         qfrc, M = numbers(load_pointer(d + d_qfrc)), numbers(load_pointer(d + d_M))
         qvel = numbers(load_pointer(d + d_qvel))
+        act, control = numbers(load_pointer(d + d_act)), numbers(load_pointer(d + d_ctrl))
         J = _scratch()
         touched = False
         for body in range(1, nbody):
@@ -242,7 +296,12 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
                 _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, at, qfrc, M, rows, J)
             elif kind in (FIN_KIND, PROPELLER_KIND):
                 dof = dofadr[base] + dofnum[base] - 1
-                _surface(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
+                _part(kind, c, o, body, water, time, xpos, xmat, cvel, qvel[dof], com, cdof, parent, dof, qfrc)
+            elif kind == THRUSTER_KIND:
+                dof = dofadr[base] + dofnum[base] - 1
+                at = int(c[o + CHANNEL])
+                command = act[at] if at >= 0 else control[-1 - at]
+                _part(kind, c, o, body, water, time, xpos, xmat, cvel, command, com, cdof, parent, dof, qfrc)
         if touched:
             _factor_M(m, d)
             _project(m, d)
@@ -262,6 +321,9 @@ def _library() -> ctypes.CDLL:
     raise OSError(f"no MuJoCo library in {folder}")
 
 
+INSIDE = ("forces.py", "pointers.py", "submergence.py", "water_slot.py")  # whose code is in the callback's
+
+
 def _cached_code() -> list[Path]:
     """The index files of numba's cache for this module that are up to date; the others are deleted.
 
@@ -271,7 +333,7 @@ def _cached_code() -> list[Path]:
         folder = Path(FunctionCache(_build).cache_path)
     except RuntimeError:  # numba finds no folder that it may write to
         return []
-    written = max(Path(__file__).with_name(name).stat().st_mtime for name in ("forces.py", "pointers.py"))
+    written = max(Path(__file__).with_name(name).stat().st_mtime for name in INSIDE)
     current = []
     for index in folder.glob("fluid.*.nbi"):
         if index.stat().st_mtime < written:

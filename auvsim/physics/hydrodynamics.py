@@ -13,9 +13,12 @@ import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip_matrix
-from auvsim.physics import fluid
+from auvsim.physics import fluid, thrusters
 from auvsim.physics.forces import (
+    BRAKE,
+    CHANNEL,
     DENSITY,
+    DERIVED,
     FIN,
     FIN_KIND,
     HULL,
@@ -26,18 +29,24 @@ from auvsim.physics.forces import (
     RECORD,
     SLOT,
     STRIPS,
+    THRUSTER,
+    THRUSTER_KIND,
 )
+from auvsim.physics.strips import submerged_strips
 
 SEA_WATER = 1026.0  # density [kg/m3], as the REMUS-100 reference has it
+BRAKE_TIME = 0.02  # time in which a shaft faster than its motor's limits slows down [s]
 
 _KINDS = {"hull": (HULL_KIND, HULL), "fin": (FIN_KIND, FIN), "propeller": (PROPELLER_KIND, PROPELLER)}
+_KINDS |= {"thruster": (THRUSTER_KIND, THRUSTER)}
 _REQUIRED = {
     "hull": ("added_mass", "displaced_volume"),
     "fin": ("area", "lift_slope", "stall_angle"),
     "propeller": ("diameter", "thrust_coefficients", "torque_coefficients"),
+    "thruster": ("thrust", "size"),
 }
 _MATRICES = ("added_mass", "linear_damping", "quadratic_damping")
-_SIGNED = ("body_lift_x", "strip_x", "thrust_coefficients", "torque_coefficients", *_MATRICES)
+_SIGNED = ("body_lift_x", "reaction", "strip_x", "thrust_coefficients", "torque_coefficients", *_MATRICES)
 
 
 class Body(NamedTuple):
@@ -45,7 +54,7 @@ class Body(NamedTuple):
 
     index: int
     name: str
-    kind: str  # hull, fin or propeller
+    kind: str  # hull, fin, propeller or thruster
     fields: dict[str, Array]
 
 
@@ -102,6 +111,13 @@ def _check(index: int, name: str, fields: dict[str, Array]) -> Body:
             raise InputError(f"'{name}_{field}' is not symmetric")
         if np.linalg.eigvalsh(matrix + matrix.T).min() < -1e-9 * max(1.0, np.abs(matrix).max()):
             raise InputError(f"'{name}_{field}' is not positive semidefinite (M_A and D are positive here)")
+    if kind == "thruster" and fields.get("dead_band", np.zeros(1))[0] >= 1.0:
+        raise InputError(f"'{name}_dead_band' is {fields['dead_band'][0]:g}; full command is 1")
+    if fields.get("astern_loss", np.zeros(1))[0] > 1.0:
+        raise InputError(f"'{name}_astern_loss' is {fields['astern_loss'][0]:g}; it is a share, at most 1")
+    for field in ("torque_limit", "power_limit"):
+        if field in fields and fields[field][0] > 0.0 >= fields["torque_coefficients"][0]:
+            raise InputError(f"'{name}_{field}' needs a positive K_Q0 in '{name}_torque_coefficients'")
     if np.any(fields.get("quadratic_damping", np.zeros((6, 6))).diagonal() < 0):
         raise InputError(f"'{name}_quadratic_damping' has a negative diagonal (D is positive here)")
     return Body(index, name, kind, fields)
@@ -115,6 +131,10 @@ def _record(body: Body, slot: int, density: float) -> Array:
     for field, value in body.fields.items():
         value = flip_matrix(value) if field in _MATRICES else value
         record[table[field][0] : table[field][0] + value.size] = value.ravel()
+    if body.kind == "hull":
+        for field, value in submerged_strips(body.fields).items():
+            at = (HULL | DERIVED)[field][0]
+            record[at : at + value.size] = value
     return record
 
 
@@ -145,6 +165,11 @@ def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:
         base = model.body_rootid[body.index]
         slot = slots.setdefault(model.body(base).name, fluid.WATER * len(slots))
         model.body_user[body.index, :RECORD] = _record(body, slot, density)
+        if body.kind == "propeller":
+            armature = model.dof_armature[model.body_dofadr[body.index]]
+            model.body_user[body.index, BRAKE] = armature / BRAKE_TIME
+        elif body.kind == "thruster":
+            model.body_user[body.index, CHANNEL] = thrusters.channel(model, body.name)
     if model.nuserdata < fluid.WATER * len(slots):
         raise InputError(
             f"{len(slots)} vehicles need <size nuserdata='{fluid.WATER * len(slots)}'>, not {model.nuserdata}"
@@ -161,8 +186,10 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
         raise InputError("option density and viscosity must be 0: MuJoCo's own fluid model would act as well")
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
         raise InputError(
-            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up"
+            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would accumulate"
         )
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
     for body in elements:
         base, weld = model.body_rootid[body.index], model.body_weldid[body.index]
         free = model.body_dofnum[base] == 6 and model.jnt_type[model.body_jntadr[base]] == mujoco.mjtJoint.mjJNT_FREE
@@ -172,6 +199,8 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
             )
         if body.kind == "propeller" and not _on_a_shaft(model, body.index):
             raise InputError(f"propeller '{body.name}' needs a shaft: one hinge joint about its x axis")
+        if body.kind == "thruster":
+            thrusters.check_place(model, data, body.index, body.fields["size"][0])
         if body.kind == "hull" and model.body_simple[base]:
             raise InputError(
                 f"hull '{body.name}': MuJoCo keeps only the diagonal inertia of a body without children whose centre of"

@@ -1,4 +1,4 @@
-"""Where the fields of MuJoCo's C structs are, from the introspection that ships with MuJoCo, verified before use."""
+"""Offsets of the fields of MuJoCo's C structs, from MuJoCo's own introspection, verified before use."""
 
 import ctypes
 from functools import cache
@@ -57,12 +57,17 @@ def verify() -> None:
     Raises:
         AuvsimError: MuJoCo's structs are laid out otherwise than its introspection says.
     """
-    body = "<worldbody><body><freejoint/><geom size='1'/></body></worldbody>"
+    body = "<worldbody><body><freejoint/><geom size='1'/><site name='s'/></body></worldbody>"
+    body += "<actuator><general site='s' dyntype='filter'/></actuator>"
     model = mujoco.MjModel.from_xml_string(f"<mujoco><size nuser_body='2' nuserdata='3'/>{body}</mujoco>")
     data = mujoco.MjData(model)
     for struct, owner, names in (
         ("mjModel", model, ("body_user", "body_weldid", "body_dofadr", "dof_parentid", "M_rowadr", "body_rootid")),
-        ("mjData", data, ("M", "qfrc_passive", "userdata", "cvel", "cdof", "xpos", "xmat", "subtree_com", "qvel")),
+        (
+            "mjData",
+            data,
+            ("M", "qfrc_passive", "userdata", "cvel", "cdof", "xpos", "xmat", "subtree_com", "qvel", "act", "ctrl"),
+        ),
     ):
         for name in names:
             found = ctypes.c_void_p.from_address(owner._address + offsets(struct)[name]).value

@@ -1,4 +1,4 @@
-"""The look of the scene: light, water and sea floor; nothing here touches physics but the height of the floor."""
+"""Appearance of the scene: light, water and sea floor; only the height of the floor matters to physics."""
 
 from typing import Any
 
@@ -14,23 +14,24 @@ HALF_WIDTH = 1500.0  # of the sea floor [m]
 EXTENT = 100.0  # of the scene, the unit of MuJoCo's distances [m]
 MURK = (4.0, 65.0)  # distances at which the water begins to hide things and hides all [m]
 PILLAR_TOP = 1.6  # below the dock's axis [m]
+SEA_FLOOR = "sea_floor"  # name of its geom
 METAL = (0.35, 0.38, 0.42, 1.0)
 
 
-def furnish(root: Any, sea_floor: float, dock_depth: float) -> None:
+def furnish(root: Any, sea_floor: float, center: Array) -> None:
     """Adds the sea floor (the geom `sea_floor`), light and water to a PyMJCF scene.
 
     Args:
         root: the scene.
         sea_floor: its depth [m].
-        dock_depth: depth of the dock's mouth, round which the scene is centred [m].
+        center: (3,) point round which the scene is drawn, in MuJoCo's world [m].
     """
     root.visual.map.znear, root.visual.map.zfar = 0.002, 30.0  # of the extent
     root.visual.map.fogstart, root.visual.map.fogend = (distance / EXTENT for distance in MURK)
     root.visual.quality.shadowsize = 0  # software drawing: shadows cost 200 ms a frame
     whole = getattr(root.visual, "global")
     whole.offwidth, whole.offheight = 1920, 1080
-    root.statistic.extent, root.statistic.center = EXTENT, (0, 0, -dock_depth)
+    root.statistic.extent, root.statistic.center = EXTENT, center
     root.visual.headlight.ambient, root.visual.headlight.diffuse = (0.38, 0.42, 0.44), (0.25, 0.27, 0.28)
     root.visual.headlight.specular = (0.1, 0.1, 0.1)
     root.visual.rgba.fog = root.visual.rgba.haze = (*WATER, 1.0)
@@ -54,7 +55,7 @@ def _add_sea_floor(root: Any, depth: float) -> None:
     root.asset.add("material", name="sand", texture="sand", texrepeat=(repeat, repeat), specular=0, shininess=0)
     root.worldbody.add(
         "geom",
-        name="sea_floor",
+        name=SEA_FLOOR,
         type="plane",
         size=(HALF_WIDTH, HALF_WIDTH, 10),
         pos=(0, 0, -depth),
@@ -86,43 +87,39 @@ def _add_light(root: Any) -> None:
     )
 
 
-def add_pillar(root: Any, sea_floor: float, dock_depth: float, forward: Array) -> None:
-    """Adds what the dock stands on, without collisions, where there is room for it.
+def add_pillar(root: Any, name: str, ends: Array) -> None:
+    """Adds what a structure stands on, without collisions.
 
     Args:
         root: the scene.
-        sea_floor: its depth [m].
-        dock_depth: depth of the dock's mouth [m].
-        forward: (2,) place of the pillar's axis in MuJoCo's world, x and y [m].
+        name: of its geom.
+        ends: (6,) from `pillar_ends`.
     """
-    if _has_pillar(sea_floor, dock_depth):
-        root.worldbody.add(
-            "geom",
-            name="pillar",
-            type="cylinder",
-            size=(0.12,),
-            fromto=_pillar_ends(sea_floor, dock_depth, forward),
-            contype=0,
-            conaffinity=0,
-            group=1,
-            rgba=METAL,
-        )
+    root.worldbody.add(
+        "geom",
+        name=name,
+        type="cylinder",
+        size=(0.12,),
+        fromto=ends,
+        contype=0,
+        conaffinity=0,
+        group=1,
+        rgba=METAL,
+    )
 
 
-def _has_pillar(sea_floor: float, dock_depth: float) -> bool:
-    """Whether there is room for one."""
-    return sea_floor > dock_depth + PILLAR_TOP
+def pillar_ends(sea_floor: float, depth: float, place: Array) -> Array | None:
+    """Top and foot (6,) of the axis of a structure's pillar in MuJoCo's world [m]; None where there is no room for one.
 
-
-def turn_pillar(spec: mujoco.MjSpec, sea_floor: float, dock_depth: float, forward: Array) -> None:
-    """Puts the pillar of a scene elsewhere; arguments as of `add_pillar`."""
-    if _has_pillar(sea_floor, dock_depth):
-        spec.geom("pillar").fromto = _pillar_ends(sea_floor, dock_depth, forward)
-
-
-def _pillar_ends(sea_floor: float, dock_depth: float, forward: Array) -> tuple[float, ...]:
-    x, y = forward.tolist()
-    return x, y, -dock_depth - PILLAR_TOP, x, y, -sea_floor
+    Args:
+        sea_floor: its depth [m].
+        depth: of the structure's mouth [m].
+        place: (2,) of the pillar's axis in MuJoCo's world, x and y [m].
+    """
+    if sea_floor <= depth + PILLAR_TOP:
+        return None
+    x, y = place.tolist()
+    return np.array([x, y, -depth - PILLAR_TOP, x, y, -sea_floor])
 
 
 def paint_sea_floor(model: mujoco.MjModel) -> None:

@@ -1,67 +1,256 @@
-"""Compiled scenes of trials, quickly: composed once for each vehicle and dock, and then only turned to the heading.
+"""Compiled scenes of vehicles and structures: composed once for each fleet, then only moved and turned.
 
-To compose a scene with PyMJCF takes a ninth of a whole trial, to turn and compile it again 5 ms. The compiled model is
-the same bit for bit.
+To compose a scene with PyMJCF takes a ninth of a whole trial, to move its structures and compile it again 5 ms. The
+compiled model is the same bit for bit.
 """
 
+import re
+from collections.abc import Mapping
 from functools import lru_cache
-from typing import NamedTuple
+from pathlib import Path
+from typing import Any, Literal, NamedTuple
 
 import mujoco
+import numpy as np
+from dm_control import mjcf
+from pydantic import Field
 
-from auvsim.base.frames import euler_to_quaternion, flip_quaternion
-from auvsim.physics import scenery, world
-from auvsim.physics.truth import DockPose
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array, euler_to_quaternion, flip, flip_quaternion
+from auvsim.base.settings import Settings
+from auvsim.physics import hydrodynamics, scenery, soundness
+from auvsim.physics.fluid import WATER
+from auvsim.physics.forces import RECORD
+from auvsim.physics.truth import StructurePose
 from auvsim.vehicles import library
+from auvsim.water.terrain import FlatFloor, Terrain
+
+Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+_NAME = re.compile(r"[A-Za-z0-9_.-]+")
+
+
+class WorldSettings(Settings):
+    """What surrounds the vehicles."""
+
+    integrator: Integrator = Field(
+        default="implicitfast",
+        description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
+    )
+    water_density: float = Field(default=hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
+    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
 
 
 class Scene(NamedTuple):
-    """A compiled scene, and what is in it; the PyMJCF elements of the latter are shared by all such scenes."""
+    """A compiled scene and what is in it, by instance name; scenes of one fleet share the PyMJCF elements."""
 
     model: mujoco.MjModel
-    vehicle: library.Vehicle
-    dock: library.Dock
+    vehicles: dict[str, library.Vehicle]
+    structures: dict[str, library.Structure]
+    poses: dict[str, StructurePose]
+    terrain: Terrain
 
 
-def compiled(vehicle: str, dock: str, pose: DockPose, settings: world.WorldSettings, rate: float) -> Scene:
-    """The scene of a trial, as `world.compose` makes it.
+def scene(
+    fleet: Mapping[str, str],
+    structures: Mapping[str, tuple[str, StructurePose]],
+    settings: WorldSettings,
+    rate: float,
+) -> Scene:
+    """Scene of vehicles and structures, as `compose` makes it.
+
+    Vehicles are free, in the order given, and stand at the origin until the world places them. What was composed is
+    kept by the text of the models' MJCF files; files that these refer to are not looked at again.
 
     Args:
-        vehicle: as `library.vehicle` takes it.
-        dock: as `library.dock` takes it.
-        pose: of the dock.
+        fleet: model of each vehicle, by instance name; models as `library.vehicle` takes them.
+        structures: model and pose of each structure, by instance name; models as `library.structure` takes them.
         settings: of what surrounds them.
         rate: physics steps per second [Hz].
 
     Raises:
-        InputError: a model cannot be used, or MuJoCo refuses the scene.
+        InputError: a name or model cannot be used, or MuJoCo refuses the scene.
     """
-    spec, loaded_vehicle, loaded_dock = _composed(
-        vehicle,
-        dock,
-        pose.depth,
+    poses = {name: pose for name, (_, pose) in structures.items()}
+    for model in fleet.values():
+        soundness.check(model, settings.water_density)
+    composed = _composed(
+        tuple((name, model, *library.source("vehicle", model)) for name, model in fleet.items()),
+        tuple((name, model, *library.source("structure", model)) for name, (model, _) in structures.items()),
+        tuple(scenery.pillar_ends(settings.sea_floor, pose.depth, np.zeros(2)) is not None for pose in poses.values()),
         settings,  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
         rate,
     )
-    spec = spec.copy()
-    quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
-    spec.site("dock").quat = spec.body(f"{loaded_dock.name}/").quat = quaternion
-    scenery.turn_pillar(spec, settings.sea_floor, pose.depth, world.pillar_place(loaded_dock, pose))
+    for name, pose in poses.items():
+        _check_depth(name, composed.structures[name], pose, settings)
+    spec = composed.spec.copy()
+    spec.stat.center = _center(poses.values(), settings)
+    for name, pose in poses.items():
+        place, quaternion = _place(pose)
+        for element in (spec.site(name), spec.body(f"{name}/")):
+            element.pos, element.quat = place, quaternion
+        ends = _pillar(composed.structures[name], pose, settings)
+        if ends is not None:
+            spec.geom(_pillar_name(name)).fromto = ends
     try:
-        return Scene(spec.compile(), loaded_vehicle, loaded_dock)
+        model = spec.compile()
     except ValueError as error:
-        raise world.refused("trial", error) from None
+        raise _refused(error) from None
+    return Scene(model, composed.vehicles, composed.structures, poses, FlatFloor(settings.sea_floor))
+
+
+class _Composed(NamedTuple):
+    spec: mujoco.MjSpec
+    vehicles: dict[str, library.Vehicle]
+    structures: dict[str, library.Structure]
 
 
 @lru_cache(maxsize=16)
 def _composed(
-    vehicle: str, dock: str, depth: float, settings: world.WorldSettings, rate: float
-) -> tuple[mujoco.MjSpec, library.Vehicle, library.Dock]:
-    """The scene with the dock looking north."""
-    loaded_vehicle, loaded_dock = library.vehicle(vehicle), library.dock(dock)
-    root = world.compose(loaded_vehicle, loaded_dock, DockPose(depth=depth, heading=0.0), settings, rate)
+    fleet: tuple[tuple[str, str, Path, str], ...],
+    structures: tuple[tuple[str, str, Path, str], ...],
+    pillars: tuple[bool, ...],
+    settings: WorldSettings,
+    rate: float,
+) -> _Composed:
+    """The scene with every structure at the origin, looking north; files and texts of the models are the cache's keys.
+
+    Args:
+        fleet: name, model, file and its text of each vehicle.
+        structures: the same of each structure.
+        pillars: whether each structure has room for a pillar.
+        settings: of what surrounds them.
+        rate: physics steps per second [Hz].
+    """
+    vehicles = {name: library.vehicle(model) for name, model, _, _ in fleet}
+    loaded = {name: library.structure(model) for name, model, _, _ in structures}
+    # A depth that has room for a pillar, or has not, as the structure's own.
+    poses = {
+        name: StructurePose(depth=settings.sea_floor - (2.0 * scenery.PILLAR_TOP if pillar else 0.0), heading=0.0)
+        for name, pillar in zip(loaded, pillars, strict=True)
+    }
+    root = compose(vehicles, {name: (loaded[name], poses[name]) for name in loaded}, settings, rate)
     try:
         spec = mujoco.MjSpec.from_string(root.to_xml_string(), assets=root.get_assets())
     except ValueError as error:
-        raise world.refused("trial", error) from None
-    return spec, loaded_vehicle, loaded_dock
+        raise _refused(error) from None
+    return _Composed(spec, vehicles, loaded)
+
+
+def compose(
+    vehicles: Mapping[str, library.Vehicle],
+    structures: Mapping[str, tuple[library.Structure, StructurePose]],
+    settings: WorldSettings,
+    rate: float,
+) -> Any:
+    """The scene as one PyMJCF model: sea floor, structures, vehicles with a free joint, and the open latches.
+
+    Every pair of a structure and a vehicle has a capture sensor and a latch, both named by `pair_name`.
+
+    Args:
+        vehicles: by instance name, freshly loaded; their models are renamed to it.
+        structures: the same, and where they are.
+        settings: of what surrounds them.
+        rate: physics steps per second [Hz].
+
+    Raises:
+        InputError: an instance name is used twice or holds anything but letters, digits, '_', '.' and '-'.
+    """
+    _check_names([*vehicles, *structures])
+    root: Any = mjcf.RootElement(model="trial")
+    root.compiler.angle = "radian"
+    root.size.nuser_body, root.size.nuserdata = RECORD, WATER * len(vehicles)
+    root.option.timestep, root.option.integrator = 1.0 / rate, settings.integrator
+    root.option.flag.autoreset = "disable"  # a diverging simulation must be seen, not restarted
+    scenery.furnish(root, settings.sea_floor, _center([pose for _, pose in structures.values()], settings))
+    for name, (structure, pose) in structures.items():
+        structure.root.model = name
+        place, quaternion = _place(pose)
+        root.worldbody.add("site", name=name, pos=place, quat=quaternion, rgba=(0, 0, 0, 0)).attach(structure.root)
+        ends = _pillar(structure, pose, settings)
+        if ends is not None:
+            scenery.add_pillar(root, _pillar_name(name), ends)
+    for name, vehicle in vehicles.items():
+        vehicle.root.model, vehicle.root.size.nuserdata = name, None
+        root.worldbody.attach(vehicle.root).add("freejoint")
+    for structure in structures:
+        for vehicle in vehicles:
+            _add_latch(root, structure, vehicle)
+    return root
+
+
+def pair_name(structure: str, vehicle: str) -> str:
+    """Name of the capture sensor and of the latch of a structure for a vehicle."""
+    return f"{structure}:{vehicle}"
+
+
+def _add_latch(root: Any, structure: str, vehicle: str) -> None:
+    name = pair_name(structure, vehicle)
+    root.sensor.add("insidesite", name=name, objtype="site", objname=f"{vehicle}/nose", site=f"{structure}/capture")
+    root.equality.add(
+        "weld",
+        name=name,
+        site1=f"{structure}/latched",
+        site2=f"{vehicle}/nose",
+        active=False,
+        solref=(0.15, 1.0),
+        solimp=(0.1, 0.1, 0.001),
+    )
+
+
+def _check_names(names: list[str]) -> None:
+    for name in names:
+        if not _NAME.fullmatch(name):
+            raise InputError(f"instance name '{name}': give letters, digits, '_', '.' or '-'")
+        if name == scenery.SEA_FLOOR:
+            raise InputError(f"instance name '{name}' is the sea floor's; give another")
+        if names.count(name) > 1:
+            raise InputError(f"instance name '{name}' is used {names.count(name)} times; give each its own")
+
+
+def _place(pose: StructurePose) -> tuple[Array, Array]:
+    """Position (3,) and quaternion (4,) of a structure in MuJoCo's world."""
+    quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
+    return flip(pose.position) + 0.0, quaternion  # without the sign of a zero
+
+
+def _center(poses: Any, settings: WorldSettings) -> Array:
+    """Middle (3,) of the structures in MuJoCo's world; of the water column where there are none."""
+    places = [_place(pose)[0] for pose in poses]
+    return np.mean(places, axis=0) if places else np.array([0.0, 0.0, -0.5 * settings.sea_floor])
+
+
+def _check_depth(name: str, structure: library.Structure, pose: StructurePose, settings: WorldSettings) -> None:
+    """Sees that the mouth of a structure is in the water as a whole."""
+    radius, floor = structure.mouth_radius, settings.sea_floor
+    if not radius <= pose.depth <= floor - radius:
+        raise InputError(
+            f"structure '{name}': a mouth of radius {radius:g} m at a depth of {pose.depth:g} m is not wholly between "
+            f"the surface and the sea floor at {floor:g} m; give a depth between {radius:g} and {floor - radius:g} m"
+        )
+
+
+def _pillar_name(structure: str) -> str:
+    return f"{structure}:pillar"
+
+
+def _pillar(structure: library.Structure, pose: StructurePose, settings: WorldSettings) -> Array | None:
+    """Ends (6,) of a structure's pillar, which stands 0.3 m behind the end of its cone."""
+    ahead = (structure.cone_length + 0.3) * np.array([np.cos(pose.heading), -np.sin(pose.heading)])
+    return scenery.pillar_ends(settings.sea_floor, pose.depth, _place(pose)[0][:2] + ahead)
+
+
+def compile_scene(root: Any) -> mujoco.MjModel:
+    """Compiles a composed scene.
+
+    Raises:
+        InputError: MuJoCo refuses it; the text has its reason.
+    """
+    try:
+        return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
+    except ValueError as error:
+        raise _refused(error) from None
+
+
+def _refused(error: ValueError) -> InputError:
+    """MuJoCo's reason for not compiling a scene, in one line."""
+    return InputError(f"scene 'trial': {' '.join(str(error).split())[:300]}")

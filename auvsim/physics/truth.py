@@ -1,16 +1,15 @@
-"""What a world says of its vehicle and its dock: the state that sensors measure and logs keep."""
+"""True states of vehicles and structures: what sensors measure and logs keep."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
+
+import numpy as np
 
 from auvsim.base.frames import Array
 
 
 class Truth(NamedTuple):
-    """True state of a vehicle at one instant, in NED and forward-starboard-down.
-
-    The origin of NED is on the sea surface above the centre of the dock's mouth.
-    """
+    """True state of a vehicle at one instant, in NED from the datum and forward-starboard-down."""
 
     time: float  # [s]
     position: Array  # (3,) north, east, down of the body origin (centre of buoyancy) [m]
@@ -18,15 +17,21 @@ class Truth(NamedTuple):
     attitude: Array  # (3,) roll, pitch, yaw [rad]
     nu: Array  # (6,) body velocity over ground u, v, w, p, q, r [m/s, rad/s]
     current: Array  # (3,) water velocity at the body origin, NED [m/s]
-    fins: Array  # (n,) fin angles, in the order of the vehicle's allocation [rad]
-    shaft_speed: float  # propeller shaft speed [rad/s]
+    actuators: Array  # (n,) in the order of the actuation's channels: fin angles [rad], then shaft speed [rad/s]
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class DockPose:
-    """Where the dock truly is: the centre of its mouth is at (0, 0, depth) in NED."""
+class StructurePose:
+    """Where a structure truly is: the centre of its mouth in NED, and its attitude."""
 
-    depth: float  # of the centre of the mouth [m]
+    north: float = 0.0  # [m]
+    east: float = 0.0  # [m]
+    depth: float  # [m]
     heading: float  # course of a vehicle that enters [rad]
     pitch: float = 0.0  # [rad]
     roll: float = 0.0  # [rad]
+
+    @property
+    def position(self) -> Array:
+        """Centre of the mouth (3,) in NED [m]."""
+        return np.array([self.north, self.east, self.depth])

@@ -1,170 +1,112 @@
-"""The physical world of a trial: composes the scene, steps MuJoCo, owns its state, and gives `Truth`."""
+"""The physical world: n vehicles and n structures in the water, stepped by MuJoCo; gives their true states."""
 
-import math
-from typing import Any, Literal, NamedTuple
+from collections.abc import Sequence
+from itertools import combinations
 
 import mujoco
 import numpy as np
-from dm_control import mjcf
-from pydantic import Field
 
 from auvsim.base.errors import DivergenceError, InputError
-from auvsim.base.frames import (
-    FLIP,
-    FLIP6,
-    FLIP_QUATERNION,
-    Array,
-    euler_to_quaternion,
-    flip,
-    flip_matrix,
-    flip_quaternion,
-)
-from auvsim.base.settings import Settings
-from auvsim.physics import hydrodynamics, scenery
-from auvsim.physics.fluid import WATER
-from auvsim.physics.forces import RECORD
-from auvsim.physics.truth import DockPose, Truth
+from auvsim.base.frames import Array, flip
+from auvsim.physics import hydrodynamics
+from auvsim.physics.contacts import Contact, ContactRecorder
+from auvsim.physics.craft import Craft
+from auvsim.physics.scenes import Scene, pair_name
+from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
 
-NEAR = 4.0  # distance from the dock's mouth within which contact is looked for at every physics tick [m]
+# Distances within which contact is looked for at every physics tick [m].
+NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
+NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
+NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
+LOOKOUT = 0.25  # longest time between two checks of these distances [s]
 
 
-class WorldSettings(Settings):
-    """What surrounds the vehicle."""
-
-    integrator: Literal["Euler", "implicit", "implicitfast", "RK4"] = Field(
-        default="implicitfast",
-        description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
-    )
-    water_density: float = Field(default=hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
-    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
-
-
-class Contact(NamedTuple):
-    """Contact between vehicle and surroundings during one physics tick."""
-
-    time: float  # [s]
-    force: float  # sum of the magnitudes of the contact forces [N]
-
-
-def compose(vehicle: library.Vehicle, dock: library.Dock, pose: DockPose, settings: WorldSettings, rate: float) -> Any:
-    """The scene as one PyMJCF model: sea floor, dock, vehicle with a free joint, and the open latch between them.
+class StructureState:
+    """A structure in the world, and its latch.
 
     Args:
-        rate: physics steps per second [Hz].
+        structure: its model.
+        pose: where it is.
+        latches: index of its latch for each vehicle.
+        active: MuJoCo's flags of active constraints.
     """
-    root: Any = mjcf.RootElement(model="trial")
-    root.compiler.angle = "radian"
-    root.size.nuser_body, root.size.nuserdata = RECORD, WATER
-    root.option.timestep, root.option.integrator = 1.0 / rate, settings.integrator
-    root.option.flag.autoreset = "disable"  # a diverging simulation must be seen, not restarted
-    scenery.furnish(root, settings.sea_floor, pose.depth)
-    quaternion = flip_quaternion(euler_to_quaternion(pose.roll, pose.pitch, pose.heading))
-    place = root.worldbody.add("site", name="dock", pos=(0, 0, -pose.depth), quat=quaternion, rgba=(0, 0, 0, 0))
-    place.attach(dock.root)
-    scenery.add_pillar(root, settings.sea_floor, pose.depth, pillar_place(dock, pose))
-    frame = root.worldbody.attach(vehicle.root)
-    frame.add("freejoint")
-    root.sensor.add(
-        "insidesite", name="captured", objtype="site", objname=f"{vehicle.name}/nose", site=f"{dock.name}/capture"
-    )
-    root.equality.add(
-        "weld",
-        name="latch",
-        site1=f"{dock.name}/latched",
-        site2=f"{vehicle.name}/nose",
-        active=False,
-        solref=(0.15, 1.0),
-        solimp=(0.1, 0.1, 0.001),
-    )
-    return root
 
+    def __init__(
+        self, structure: library.Structure, pose: StructurePose, latches: dict[str, int], active: "np.ndarray"
+    ) -> None:
+        self.structure, self.pose = structure, pose
+        self._latches, self._active = latches, active
 
-def pillar_place(dock: library.Dock, pose: DockPose) -> Array:
-    """Where the axis of the dock's pillar is: (2,) x and y in MuJoCo's world [m]."""
-    return (dock.cone_length + 0.3) * np.array([np.cos(pose.heading), -np.sin(pose.heading)])
+    @property
+    def latched(self) -> str | None:
+        """Name of the vehicle that its latch holds."""
+        return next((name for name, latch in self._latches.items() if self._active[latch]), None)
 
+    def holds(self, vehicle: str) -> bool:
+        """Whether its latch holds a vehicle."""
+        return bool(self._active[self._latches[vehicle]])
 
-def compile_scene(root: Any) -> mujoco.MjModel:
-    """Compiles a composed scene.
+    def hold(self, vehicle: str) -> None:
+        """Closes the latch on a vehicle."""
+        self._active[self._latches[vehicle]] = 1
 
-    Raises:
-        InputError: MuJoCo refuses it; the text has its reason.
-    """
-    try:
-        return mujoco.MjModel.from_xml_string(root.to_xml_string(), root.get_assets())
-    except ValueError as error:
-        raise refused(root.model, error) from None
-
-
-def refused(scene: str, error: ValueError) -> InputError:
-    """MuJoCo's reason for not compiling a scene, in one line."""
-    return InputError(f"scene '{scene}': {' '.join(str(error).split())[:300]}")
+    def release(self, vehicle: str) -> None:
+        """Opens the latch if it holds that vehicle."""
+        self._active[self._latches[vehicle]] = 0
 
 
 class World:
-    """One vehicle, one dock and the water, stepped by MuJoCo.
+    """Vehicles, structures and the water, stepped by MuJoCo.
 
     Args:
-        model: the compiled scene; gets its hydrodynamics here.
-        data: its state.
-        vehicle: the vehicle in it.
-        pose: where the dock is.
+        scene: what is there; its compiled model gets its hydrodynamics here.
         current: what the water does.
-        water_density: [kg/m3].
+        density: of the water [kg/m3].
+        data: MuJoCo's state where it belongs to somebody else; a new one by default.
     """
 
     def __init__(
         self,
-        model: mujoco.MjModel,
-        data: mujoco.MjData,
-        vehicle: library.Vehicle,
-        pose: DockPose,
+        scene: Scene,
         current: CurrentField,
-        water_density: float = hydrodynamics.SEA_WATER,
+        density: float = hydrodynamics.SEA_WATER,
+        *,
+        data: mujoco.MjData | None = None,
     ) -> None:
-        self.model, self.data, self.vehicle, self.pose = model, data, vehicle, pose
-        self._current = current
-        self._slot = hydrodynamics.equip(model, water_density)[f"{vehicle.name}/"]
-        self._floor = -float(model.geom("sea_floor").pos[2])
-        joint = model.joint(f"{vehicle.name}/")
-        q, v = int(joint.qposadr[0]), int(joint.dofadr[0])
-        # Views of MuJoCo's arrays, which stay where they are: to ask MjData for one costs as much as a calculation.
-        self._qpos, self._qvel, self._control, self._options = data.qpos, data.qvel, data.ctrl, model.opt
-        self._position, self._quaternion, self._velocity = (
-            data.qpos[q : q + 3],
-            data.qpos[q + 3 : q + 7],
-            data.qvel[v : v + 6],
-        )
-        self._sensors, self._active = data.sensordata, data.eq_active
-        self._water = data.userdata[self._slot : self._slot + WATER]
-        fins = [model.actuator(f"{vehicle.name}/{fin}") for fin in vehicle.allocation.names]
-        shaft = model.actuator(f"{vehicle.name}/shaft")
-        self._fins, self._fin_controls = vehicle.allocation.fins, [int(fin.id) for fin in fins]
-        self._fin_q = np.array([model.jnt_qposadr[fin.trnid[0]] for fin in fins])
-        self._shaft_control, self._shaft_v = int(shaft.id), int(model.jnt_dofadr[shaft.trnid[0]])
-        self._captured = int(model.sensor("captured").adr[0])
-        self._latch = int(model.equality("latch").id)
-        self._force, self._rotation = np.zeros(6), np.zeros(9)
-        self._matrix = self._rotation.reshape(3, 3)
+        model = scene.model
+        slots = hydrodynamics.equip(model, density)
+        self.model, self.data = model, mujoco.MjData(model) if data is None else data
+        self.current, self.density, self.terrain = current, density, scene.terrain
+        self._craft = {
+            name: Craft(model, self.data, name, vehicle, slots[f"{name}/"]) for name, vehicle in scene.vehicles.items()
+        }
+        self.vehicles = tuple(self._craft)
+        self.models = scene.vehicles
+        self._options, self._sensors = model.opt, self.data.sensordata
+        active = self.data.eq_active
+        self.structures: dict[str, StructureState] = {}
+        self._captures: list[tuple[StructureState, list[tuple[str, int]]]] = []  # and where its sensors are
+        for name, structure in scene.structures.items():
+            pairs = {vehicle: pair_name(name, vehicle) for vehicle in self.vehicles}
+            latches = {vehicle: int(model.equality(pair).id) for vehicle, pair in pairs.items()}
+            state = StructureState(structure, scene.poses[name], latches, active)
+            self.structures[name] = state
+            sensors = [(vehicle, int(model.sensor(pair).adr[0])) for vehicle, pair in pairs.items()]
+            self._captures.append((state, sensors))
+        self._mouths = [flip(state.pose.position).tolist() for state in self.structures.values()]
+        lengths = [craft.vehicle.length for craft in self._craft.values()]
+        self._meetings = [
+            (i, j, (0.5 * (lengths[i] + lengths[j]) + NEAR_VEHICLE) ** 2)
+            for i, j in combinations(range(len(lengths)), 2)
+        ]
+        self._recorder = ContactRecorder(model, self.data, self.vehicles)
         self._near_flags = int(model.opt.disableflags)
         self._far_flags = self._near_flags | int(mujoco.mjtDisableBit.mjDSBL_CONTACT)
-        self.contacts: list[Contact] = []
-
-    @classmethod
-    def build(
-        cls,
-        vehicle: library.Vehicle,
-        dock: library.Dock,
-        pose: DockPose,
-        current: CurrentField,
-        settings: WorldSettings,
-        rate: float,
-    ) -> "World":
-        """Composes and compiles the scene and puts the world round it."""
-        model = compile_scene(compose(vehicle, dock, pose, settings, rate))
-        return cls(model, mujoco.MjData(model), vehicle, pose, current, settings.water_density)
+        self._fleet = tuple(self._craft.values())
+        self._most_ticks = max(1, round(LOOKOUT / model.opt.timestep))
+        self._unplaced = set(self.vehicles)
 
     @property
     def time(self) -> float:
@@ -172,73 +114,94 @@ class World:
         return self.data.time
 
     @property
-    def latched(self) -> bool:
-        """Whether the dock's latch holds the vehicle."""
-        return bool(self._active[self._latch])
+    def floor(self) -> float:
+        """Depth of the sea floor at the datum [m]."""
+        return self.terrain.depth(0.0, 0.0)
 
-    def place(self, position: Array, heading: float, speed: float, shaft_speed: float) -> None:
-        """Resets to time zero with the vehicle level at a place, moving ahead through the water.
+    def contacts(self, vehicle: str) -> list[Contact]:
+        """Contacts of a vehicle so far, in order of time."""
+        return self._recorder.found[vehicle]
+
+    def latched(self, vehicle: str) -> str | None:
+        """Name of the structure whose latch holds a vehicle."""
+        for name, state in self.structures.items():
+            if state.holds(vehicle):
+                return name
+        return None
+
+    def reset(self) -> None:
+        """Back to time zero: no contact, all latches open, and every vehicle waiting for its place."""
+        mujoco.mj_resetData(self.model, self.data)
+        self._recorder.clear()
+        self._unplaced = set(self.vehicles)
+
+    def place(self, vehicle: str, position: Array, heading: float, speed: float, channels: Sequence[float]) -> None:
+        """Puts a vehicle level at a place, out of any latch, moving ahead through the water.
 
         Args:
+            vehicle: instance name.
             position: (3,) NED [m].
             heading: [rad].
             speed: through the water [m/s].
-            shaft_speed: [rad/s].
+            channels: (n,) commands of its actuators, which these already carry out.
 
         Raises:
             InputError: the place is out of the water or below the sea floor.
         """
-        if not 0.0 < position[2] < self._floor:
+        position = np.asarray(position, dtype=float)
+        floor = self.terrain.depth(float(position[0]), float(position[1]))
+        if not 0.0 < position[2] < floor:
             raise InputError(
-                f"start depth {position[2]:g} m is not between the surface and the sea floor at {self._floor:g} m"
+                f"vehicle '{vehicle}': start depth {position[2]:g} m is not between the surface and the sea floor at "
+                f"{floor:g} m"
             )
-        mujoco.mj_resetData(self.model, self.data)
-        self.contacts.clear()
-        water = self._current.evaluate(0.0, np.asarray(position, dtype=float)).velocity
+        for state in self.structures.values():
+            state.release(vehicle)
+        water = self.current.evaluate(self.time, position).velocity
         ahead = np.array([np.cos(heading), np.sin(heading), 0.0])
-        self._position[:] = flip(position)
-        self._quaternion[:] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
-        self._velocity[:3] = flip(speed * ahead + water)
-        self._qvel[self._shaft_v] = shaft_speed
-        self._control[self._shaft_control] = shaft_speed
-        self.refresh_water()
-        mujoco.mj_forward(self.model, self.data)
+        craft = self._craft[vehicle]
+        craft.place(position, heading, speed * ahead + water, np.asarray(channels, dtype=float))
+        craft.refresh_water(self.current, self.time)
+        self._unplaced.discard(vehicle)
+        if not self._unplaced:
+            mujoco.mj_forward(self.model, self.data)
 
     def refresh_water(self, ahead: float = 0.0) -> None:
-        """Writes the local expansion of the current round the vehicle where the fluid callback reads it.
+        """Expands the current anew round every vehicle.
 
         Args:
             ahead: how far from now the expansion is taken [s]; half the time for which it will serve makes its error
                 second order in that time.
         """
-        position, time = self._position, self.data.time + ahead
-        water = self._current.evaluate(time, flip(position))
-        slot = self._water
-        slot[0] = time
-        slot[1:4] = position
-        slot[4:7] = flip(water.velocity)
-        slot[7:10] = flip(water.derivative)
-        slot[10:19] = flip_matrix(water.gradient).ravel()
+        for craft in self._fleet:
+            craft.refresh_water(self.current, self.data.time + ahead)
 
-    def command(self, rudder: float, elevator: float, shaft_speed: float) -> None:
-        """Sets effective rudder and elevator [rad] and shaft speed [rad/s]; servos and shaft follow with their lags."""
-        control = self._control
-        for index, angle in zip(self._fin_controls, self._fins(rudder, elevator), strict=True):
-            control[index] = angle
-        control[self._shaft_control] = shaft_speed
+    def command(self, vehicle: str, channels: Sequence[float]) -> None:
+        """Sets the commands (n,) of a vehicle's actuators, in the order of its channels; each follows with its lag."""
+        self._craft[vehicle].command(channels)
 
     def advance(self, ticks: int) -> None:
         """Steps the physics.
 
-        Near the dock or the sea floor, contacts are recorded and the latch may close at every tick.
+        Where a vehicle is near a structure, the sea floor or another vehicle, contacts are recorded and latches may
+        close at every tick. The distances are looked at again every `LOOKOUT`.
 
         Raises:
-            DivergenceError: the state is no longer finite and physical.
+            DivergenceError: a vehicle's state is no longer finite and physical; the text names it.
+            InputError: a vehicle has not been placed.
         """
-        if not self._current.steady_uniform:
+        if self._unplaced:
+            raise InputError(f"vehicles without a place: {', '.join(sorted(self._unplaced))}; place them first")
+        if not self.current.steady_uniform:
             self.refresh_water(0.5 * ticks * self._options.timestep)
-        x, y, z = self._position.tolist()
-        near = x * x + y * y + (z + self.pose.depth) ** 2 < NEAR**2 or z < 2.0 - self._floor
+        most = self._most_ticks
+        while ticks > most:
+            self._advance(most)
+            ticks -= most
+        self._advance(ticks)
+
+    def _advance(self, ticks: int) -> None:
+        near = self._is_near()
         # Far from everything the search for contacts would find none, and costs a third of a step.
         self._options.disableflags = self._near_flags if near else self._far_flags
         if near:
@@ -247,9 +210,25 @@ class World:
                 self._watch()
         else:
             self._step(ticks)
-        energy = float(self._qvel.dot(self._qvel))
-        if not energy < 1e6:
-            raise DivergenceError(self._diagnosis())
+        for craft in self._fleet:
+            if not float(craft.speeds.dot(craft.speeds)) < 1e6:
+                raise DivergenceError(self._diagnosis(craft))
+
+    def _is_near(self) -> bool:
+        """Whether any vehicle may touch something soon."""
+        places = [craft.position.tolist() for craft in self._fleet]
+        depth = self.terrain.depth
+        for x, y, z in places:
+            if z < NEAR_FLOOR - depth(x, -y):
+                return True
+            for a, b, c in self._mouths:
+                if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < NEAR_STRUCTURE**2:
+                    return True
+        for i, j, reach in self._meetings:
+            (x, y, z), (a, b, c) = places[i], places[j]
+            if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < reach:
+                return True
+        return False
 
     def _step(self, ticks: int) -> None:
         mujoco.mj_step(self.model, self.data, ticks)
@@ -257,46 +236,24 @@ class World:
         self.data.time = round(self.data.time / step) * step  # MuJoCo adds steps up, and with them their rounding
 
     def _watch(self) -> None:
-        """Records contact and closes the latch when the nose is in the throat."""
-        data = self.data
-        if data.ncon:
-            total, force = 0.0, self._force[:3]
-            for i, address in enumerate(data.contact.efc_address.tolist()):
-                if address >= 0:
-                    mujoco.mj_contactForce(self.model, data, i, self._force)
-                    total += math.sqrt(force.dot(force))
-            if total > 0.0:
-                self.contacts.append(Contact(data.time, total))
-        if self._sensors[self._captured] > 0.5 and not self.latched:
-            self._active[self._latch] = 1
+        """Records contacts, and closes an open latch on a free vehicle whose nose is in the throat."""
+        if self.data.ncon:
+            self._recorder.record()
+        values = self._sensors
+        for state, sensors in self._captures:
+            for vehicle, at in sensors:
+                if values[at] > 0.5 and state.latched is None and self.latched(vehicle) is None:
+                    state.hold(vehicle)
 
-    def _diagnosis(self) -> str:
-        speeds = np.abs(np.nan_to_num(self.data.qvel, nan=np.inf))
+    def _diagnosis(self, craft: Craft) -> str:
+        speeds = np.abs(np.nan_to_num(craft.speeds, nan=np.inf))
         worst = int(speeds.argmax())
-        joint = self.model.joint(int(self.model.dof_jntid[worst])).name
-        step = self.model.opt.timestep
+        joint = self.model.joint(int(self.model.dof_jntid[craft.dofs.start + worst])).name
         return (
             f"diverged at {self.data.time:.2f} s: joint '{joint}' moves at {speeds[worst]:.3g} (m/s or rad/s); "
-            f"check the model's inertia and damping, or raise rates.physics above {1 / step:.0f} Hz"
+            f"check the model's inertia and damping, or raise rates.physics above {1 / self._options.timestep:.0f} Hz"
         )
 
-    def truth(self) -> Truth:
-        """The true state now, in NED and forward-starboard-down."""
-        time = self.data.time
-        position = self._position * FLIP
-        quaternion = self._quaternion * FLIP_QUATERNION
-        mujoco.mju_quat2Mat(self._rotation, quaternion)
-        r00, _, _, r10, _, _, r20, r21, r22 = self._rotation.tolist()
-        nu = self._velocity * FLIP6
-        over_ground = nu[:3]
-        over_ground[:] = over_ground.dot(self._matrix)
-        return Truth(
-            time=time,
-            position=position,
-            quaternion=quaternion,
-            attitude=np.array((math.atan2(r21, r22), -math.asin(max(-1.0, min(1.0, r20))), math.atan2(r10, r00))),
-            nu=nu,
-            current=self._current.evaluate(time, position).velocity,
-            fins=self._qpos.take(self._fin_q),
-            shaft_speed=float(self._qvel[self._shaft_v]),
-        )
+    def truth(self, vehicle: str) -> Truth:
+        """The true state of a vehicle now, in NED and forward-starboard-down."""
+        return self._craft[vehicle].truth(self.current)

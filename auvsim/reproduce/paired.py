@@ -1,30 +1,16 @@
 """Paired runs of a study: every filter follows the same runs, which rows of the same conditions share, on all cores."""
 
-import multiprocessing
-import os
-import signal
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from functools import partial
 from itertools import groupby
 from typing import Any
 
-from auvsim.reproduce.paper1.runs import Track, Way
+from auvsim.base.tasks import Task
+from auvsim.reproduce.paper1.runs import Track, Trajectory
 from auvsim.reproduce.paper1.study import Result, Row, Score, score, summarise
 
 REFERENCE = "paper"  # the filter by which the others' errors are divided
 SEEDS_APART = 1_000_000  # more than any row has runs: no two seeds of a study share a run
-Progress = Callable[[float, float], None]  # told what is done, and the total of it
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Task:
-    """Something to do in a process of its own."""
-
-    key: tuple
-    work: Callable[[], Any]
-    weight: float  # what it takes, in simulated seconds of all filters
 
 
 def run_seed(seed: int, number: int) -> int:
@@ -57,7 +43,7 @@ def score_tasks(
     return tasks
 
 
-def scores(rows: Mapping[str, Row], run: Way, tracks: Mapping[str, Track]) -> dict[str, dict[str, Score]]:
+def scores(rows: Mapping[str, Row], run: Trajectory, tracks: Mapping[str, Track]) -> dict[str, dict[str, Score]]:
     """By row and filter, of tracks by filter, of one run."""
     return {name: {key: score(row, run, followed) for key, followed in tracks.items()} for name, row in rows.items()}
 
@@ -77,32 +63,3 @@ def results(
 def conditions_key(rows: Mapping[str, Row], name: str) -> str:
     """The first row that has the conditions of this one: the same runs, seen through another window."""
     return next(other for other, row in rows.items() if row.conditions == rows[name].conditions)
-
-
-def run_tasks(tasks: Sequence[Task], jobs: int | None, progress: Progress | None) -> dict[tuple, Any]:
-    """What the tasks came to by their keys, in processes of their own, as many as there are cores if `jobs` is None."""
-    tasks = sorted(tasks, key=lambda task: -task.weight)  # the long ones first, so that no core waits at the end
-    total, sofar = sum(task.weight for task in tasks), 0.0
-    # Spawned, not forked: BLAS and numba may hold threads and locks of this process.
-    pool = ProcessPoolExecutor(
-        min(jobs or os.cpu_count() or 1, len(tasks)),
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_die_of_interrupts,
-    )
-    try:
-        futures: dict[Future, Task] = {pool.submit(task.work): task for task in tasks}
-        done = {}
-        for future in as_completed(futures):
-            task = futures[future]
-            done[task.key] = future.result()
-            sofar += task.weight
-            if progress:
-                progress(sofar, total)
-        return {task.key: done[task.key] for task in tasks}
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-def _die_of_interrupts() -> None:
-    """Ctrl-C reaches the workers too: they go at once and silently, and the parent says what happened."""
-    signal.signal(signal.SIGINT, signal.SIG_DFL)

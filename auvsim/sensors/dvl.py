@@ -5,17 +5,18 @@ known on a real vehicle, which takes it out with its gyro. Altitude is the verti
 """
 
 import math
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.random import Generator
 from pydantic import Field, model_validator
 
 from auvsim.base.frames import rotation
-from auvsim.base.randomness import Noise
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
+from auvsim.data.variables import Variable
 from auvsim.physics.truth import Truth
-from auvsim.water.currents import CurrentField
+from auvsim.sensors.sensor import Sensor, Surroundings
 
 Vector = tuple[float, float, float]
 USABLE = 0.8  # share of the altitude above which water track sees no bottom (as in Teledyne RDI's Pathfinder guide)
@@ -30,7 +31,7 @@ class DvlSettings(Settings):
     """
 
     enabled: bool = Field(default=False, description="whether the vehicle has it")
-    rate: float = Field(default=5.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=5.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     bottom_noise: Vector = Field(
         default=(0.01, 0.01, 0.004), description="white noise over ground: forward, starboard, down, sd [m/s]"
     )
@@ -62,19 +63,25 @@ class DvlSettings(Settings):
         return self
 
 
-class Dvl:
+class Dvl(Sensor):
     """Measures (6,) [m/s]: u, v, w over ground, then through the water; NaN where that track is lost.
 
     Each reading takes 6 normals and 2 uniforms, whatever becomes of it. Both tracks share one transducer, and so the
     errors of scale and mounting. The water's velocity is that in the middle of the layer.
     """
 
-    name = "dvl"
+    kind, Settings = "dvl", DvlSettings
+    value = Variable(
+        ("over_ground_and_through_water",),
+        "float64",
+        "m/s",
+        "velocity over ground u, v, w, then through the water u, v, w; NaN where that track is lost",
+        "body",
+    )
+    sizes: ClassVar = {"over_ground_and_through_water": 6}
 
-    def __init__(self, settings: DvlSettings, generator: Generator, current: CurrentField, sea_floor: float) -> None:
-        """A log of a trial; `sea_floor` is the depth of the sea floor [m]."""
-        self._settings, self._current, self._floor = settings, current, sea_floor
-        self._noise = Noise(generator)
+    def __init__(self, settings: DvlSettings, generator: Generator, **of_instance: Any) -> None:
+        super().__init__(settings, generator, **of_instance)
         scale, misalignment, *biases = self._noise.normals(8)
         self.scale = 1.0 + settings.scale_error * scale  # of this trial [-]
         self.misalignment = math.radians(settings.misalignment_deg) * misalignment  # of this trial [rad]
@@ -83,24 +90,21 @@ class Dvl:
         # Seen from a transducer that is turned to starboard, the same velocity is turned to port.
         self._errors = self.scale * rotation(0.0, 0.0, self.misalignment).T
         self._below = np.array((0.0, 0.0, 0.5 * sum(settings.water_layer)))
-        self._sequence = 0
 
-    def measure(self, truth: Truth) -> Reading:
-        """Pings once at each."""
-        settings = self._settings
+    def measure(self, truth: Truth, world: Surroundings) -> Reading:
+        """Pings once and measures both tracks."""
+        settings = self.settings
         noise = self.biases + self._sigmas * self._noise.normals(6)
         chances = self._noise.uniforms(2)
         ground = truth.nu[:3]
-        water = self._current.evaluate(truth.time, truth.position + self._below).velocity
+        water = world.current.evaluate(truth.time, truth.position + self._below).velocity
         through = ground - water @ rotation(*truth.attitude.tolist())
         value = np.concatenate((self._errors @ ground, self._errors @ through)) + noise
-        altitude = self._floor - float(truth.position[2])
+        altitude = world.floor - float(truth.position[2])
         bottom = settings.minimum_altitude <= altitude <= settings.maximum_altitude
         layer = altitude >= settings.minimum_altitude and USABLE * altitude >= settings.water_layer[1]
         if not bottom or chances[0] < settings.dropout_probability:
             value[:3] = math.nan
         if not layer or chances[1] < settings.dropout_probability:
             value[3:] = math.nan
-        sequence = self._sequence
-        self._sequence = sequence + 1
-        return Reading("dvl", truth.time, truth.time, value, sequence)
+        return self._reading(truth.time, value)

@@ -1,6 +1,6 @@
-"""The dm_env face of a trial, through `dm_control.rl.control`: truth in, commands out, once a control period.
+"""A run as a dm_env environment (`dm_control.rl.control`): true state observed, commands given, each control period.
 
-For learning and for controllers of one's own. No sensors or estimators stand between: the observation is the truth.
+For learning and for controllers of one's own. There are no sensors or estimators: the observation is the true state.
 """
 
 import collections
@@ -13,15 +13,46 @@ from dm_control import mjcf
 from dm_control.rl import control
 from dm_env import specs
 
-from auvsim.base.errors import DivergenceError
+from auvsim.base.errors import DivergenceError, InputError
 from auvsim.base.frames import rotation
-from auvsim.base.randomness import stream
-from auvsim.physics import planar_fit
-from auvsim.physics.truth import DockPose
-from auvsim.physics.world import World, compose
-from auvsim.simulation import scenario
+from auvsim.physics import scenes
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.world import World
+from auvsim.simulation.run import Simulation, current
+from auvsim.simulation.scenario import Scenario
 from auvsim.vehicles import library
-from auvsim.water.currents import build_current
+from auvsim.vehicles.actuation import Commands
+from auvsim.vehicles.library import Vehicle
+from auvsim.water.terrain import FlatFloor
+
+
+class CommandedAgent:
+    """An agent without sensors, estimator and mission, which carries out commands from outside."""
+
+    dock, mission, over = None, None, False
+
+    def __init__(self, name: str, plan: Scenario, vehicle: Vehicle, *_: Any, **__: Any) -> None:
+        start = plan.vehicles[name].start
+        fitted = fit_planar_model(plan.vehicles[name].model, 1.0, plan.water.density)
+        self.name, self.vehicle = name, vehicle
+        self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
+
+    def blame(self, error: BaseException) -> BaseException:
+        """The error itself."""
+        return error
+
+    def sense(self, *_: Any) -> None:
+        """Takes no readings."""
+
+    def receive(self, *_: Any) -> None:
+        """Receives no messages."""
+
+    def navigate(self, *_: Any) -> None:
+        """Knows nothing."""
+
+    def act(self, *_: Any) -> Any:
+        """The demand that was given from outside."""
+        return self.commands
 
 
 class Docking(control.Task):
@@ -32,62 +63,79 @@ class Docking(control.Task):
     ends docked, or by the time limit.
     """
 
-    def __init__(self, plan: scenario.Scenario, seed: int) -> None:
+    def __init__(self, plan: Scenario, seed: int) -> None:
         self._plan, self._seed, self._episode = plan, seed, 0
-        self._vehicle = library.vehicle(plan.vehicle.model)
-        self._dock = library.dock(plan.dock.model)
-        self._pose = DockPose(depth=plan.dock.depth, heading=math.radians(plan.dock.heading_deg))
-        self._ticks = round(plan.rates.physics / plan.rates.control)
-        believed = planar_fit.fit_planar_model(plan.vehicle.model, plan.estimator.model_speed, plan.world.water_density)
-        self._shaft = believed.shaft_speed_for(plan.vehicle.start.speed)
+        self._name, settings = plan.lone
+        self._dock_name = plan.dock_of(self._name)
+        if self._dock_name is None:
+            raise InputError("the scenario has no dock; the environment is that of a docking")
+        dock = plan.structures[self._dock_name]
+        self._vehicle, self._dock = library.vehicle(settings.model), library.structure(dock.model)
+        self._pose = dock.pose
         self._to_dock = rotation(self._pose.roll, self._pose.pitch, self._pose.heading).T
         self._distance = math.nan
-        self._world: World | None = None
+        self._simulation: Simulation | None = None
 
     def physics(self) -> mjcf.Physics:
         """A new physics of the scene."""
-        rate = self._plan.rates.physics
-        return mjcf.Physics.from_mjcf_model(compose(self._vehicle, self._dock, self._pose, self._plan.world, rate))
+        fleet, structures = {self._name: self._vehicle}, {str(self._dock_name): (self._dock, self._pose)}
+        root = scenes.compose(fleet, structures, self._plan.world, self._plan.rates.physics)
+        return mjcf.Physics.from_mjcf_model(root)
 
     def initialize_episode(self, physics: Any) -> None:
         """Places the vehicle at the scenario's start; the current is drawn anew each episode."""
-        plan = self._plan
-        generator = stream(self._seed, self._episode, f"{self._vehicle.name}/current")
-        self._episode += 1
-        current = build_current(plan.current, generator, plan.duration + 1.0)
-        self._world = World(
-            physics.model.ptr, physics.data.ptr, self._vehicle, self._pose, current, plan.world.water_density
+        plan, dock = self._plan, str(self._dock_name)
+        scene = scenes.Scene(
+            physics.model.ptr,
+            {self._name: self._vehicle},
+            {dock: self._dock},
+            {dock: self._pose},
+            FlatFloor(plan.water.sea_floor),
         )
-        start = plan.vehicle.start
-        place = np.array(scenario.start_position(plan))
-        self._world.place(place, math.radians(start.heading_deg), start.speed, self._shaft)
+        water = current(plan, self._seed, self._episode)
+        world = World(scene, water, plan.water.density, data=physics.data.ptr)
+        world.reset()
+        self._simulation = Simulation(plan, self._seed, self._episode, world=world, agents=CommandedAgent, record=False)
+        self._episode += 1
         self._distance = self._to_go()
 
     def before_step(self, action: Any, physics: Any) -> None:
-        """Sets the actuators and brings the water up to date."""
-        rudder, elevator, shaft = np.clip(np.asarray(action, dtype=float), -1.0, 1.0).tolist()
-        limit = self._vehicle.allocation.limit
-        self.world.command(rudder * limit, elevator * limit, shaft * self._vehicle.shaft_limit)
+        """Sets the demand on the actuators."""
+        fractions = np.clip(np.asarray(action, dtype=float), -1.0, 1.0)
+        if not np.isfinite(fractions).all():
+            raise InputError(f"action {fractions.tolist()}: must be three finite fractions between -1 and 1")
+        rudder, elevator, shaft = fractions.tolist()
+        actuation = self._vehicle.actuation
+        agent: Any = self.simulation.agents[0]
+        agent.commands = Commands(
+            rudder * actuation.fin_limit, elevator * actuation.fin_limit, shaft * actuation.shaft_limit
+        )
+        self.world.command(self._name, actuation.allocate(agent.commands))
 
     @property
-    def world(self) -> World:
-        """The world of the running episode.
+    def simulation(self) -> Simulation:
+        """The running episode.
 
         Raises:
             RuntimeError: no episode has begun.
         """
-        if self._world is None:
+        if self._simulation is None:
             raise RuntimeError("no episode has begun: call reset() first")
-        return self._world
+        return self._simulation
+
+    @property
+    def world(self) -> World:
+        """The world of the running episode."""
+        return self.simulation.world
 
     def advance(self) -> None:
-        """One control period of physics."""
-        self.world.advance(self._ticks)
+        """One control period."""
+        self.simulation.step()
 
     def _nose(self) -> np.ndarray:
-        truth = self.world.truth()
+        truth = self.world.truth(self._name)
         nose = rotation(*truth.attitude.tolist()) @ (self._vehicle.nose, 0.0, 0.0)
-        return self._to_dock @ (truth.position + nose - (0.0, 0.0, self._pose.depth))
+        return self._to_dock @ (truth.position + nose - self._pose.position)
 
     def _to_go(self) -> float:
         return float(np.linalg.norm(self._nose() - (self._dock.latched, 0.0, 0.0)))
@@ -98,25 +146,34 @@ class Docking(control.Task):
         nose (3,) in the dock frame [m]; attitude (3,): roll, pitch, heading off the axis [rad]; velocity (6,) over
         ground, nu [m/s, rad/s]; current (3,) in the dock's frame [m/s]; fins (n,) [rad]; shaft_speed (1,) [rad/s].
         """
-        truth = self.world.truth()
+        truth = self.world.truth(self._name)
         roll, pitch, yaw = truth.attitude.tolist()
         return collections.OrderedDict(
             nose=self._nose(),
             attitude=np.array([roll, pitch, math.remainder(yaw - self._pose.heading, 2 * math.pi)]),
             velocity=truth.nu,
             current=self._to_dock @ truth.current,
-            fins=truth.fins,
-            shaft_speed=np.array([truth.shaft_speed]),
+            fins=truth.actuators[:-1],
+            shaft_speed=truth.actuators[-1:],
         )
 
+    def observation_spec(self, physics: Any) -> "collections.OrderedDict[str, specs.Array]":
+        """Shapes of the observation, known before the first reset."""
+        sizes = {"nose": 3, "attitude": 3, "velocity": 6, "current": 3, "fins": len(self._vehicle.actuation.fins)}
+        sizes["shaft_speed"] = 1
+        return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())
+
     def get_reward(self, physics: Any) -> float:
-        """Metres come nearer since the last step, and 100 when the latch closes."""
+        """Progress since the last step [m], and 100 when the latch closes."""
         before, self._distance = self._distance, self._to_go()
-        return before - self._distance + (100.0 if self.world.latched else 0.0)
+        return before - self._distance + (100.0 if self._is_docked() else 0.0)
 
     def get_termination(self, physics: Any) -> float | None:
         """0 (the episode is over for good) when docked."""
-        return 0.0 if self.world.latched else None
+        return 0.0 if self._is_docked() else None
+
+    def _is_docked(self) -> bool:
+        return self.world.latched(self._name) is not None
 
     def action_spec(self, physics: Any) -> specs.BoundedArray:
         """Three fractions in -1..1."""
@@ -124,7 +181,7 @@ class Docking(control.Task):
 
 
 class _Environment(control.Environment):
-    """Steps through `World`, which looks for contact and closes the latch; a diverged episode ends with discount 0."""
+    """Steps through the simulation's loop; a diverged episode ends with discount 0."""
 
     def step(self, action: Any) -> dm_env.TimeStep:
         if self._reset_next_step:
@@ -144,13 +201,20 @@ class _Environment(control.Environment):
         self._reset_next_step = True
         return dm_env.TimeStep(dm_env.StepType.LAST, reward, discount, observation)
 
+    def observation_spec(self) -> Any:
+        """Shapes of the observation, by name."""
+        return self._task.observation_spec(self._physics)  # pyright: ignore[reportAttributeAccessIssue]
 
-def load(plan: scenario.Scenario, seed: int = 0) -> control.Environment:
-    """A dm_env environment of a scenario.
+
+def load(plan: Scenario, seed: int = 0) -> control.Environment:
+    """A dm_env environment of a scenario of one vehicle and a dock.
 
     Args:
         plan: start, dock, current and limits; its duration is the time limit.
         seed: of the random currents; episode k of a seed is always the same.
+
+    Raises:
+        InputError: the scenario has several vehicles or no dock.
     """
     task = Docking(plan, seed)
     return _Environment(

@@ -1,4 +1,4 @@
-"""From a plan, in which values may be distributions, to definite values, given a seed.
+"""Draws definite values from a plan, in which values may be distributions, given a seed.
 
 A distribution stands where its value would: `range: {uniform: [250, 350]}`. Each draws from a stream of its own, named
 by its dotted key, so that pinning one value changes no other.
@@ -11,8 +11,8 @@ from typing import Any
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.randomness import stream
+from auvsim.simulation import short
 from auvsim.simulation.distributions import DISTRIBUTIONS, Distribution
-from auvsim.simulation.scenario import Scenario
 
 RANDOM = {
     "vehicle": {
@@ -31,7 +31,7 @@ RANDOM = {
     },
 }
 
-# A manoeuvre starts far from the dock, ahead away from it and at another depth; only the current is left to chance.
+# A manoeuvre starts far from the dock, ahead away from it and at another depth; only the current is drawn.
 MANOEUVRE = {
     "vehicle": {
         "start": {"range": 300.0, "bearing_deg": 0.0, "heading_deg": 0.0, "depth": 10.0, "speed": 1.5},
@@ -39,13 +39,13 @@ MANOEUVRE = {
     "dock": {"heading_deg": 180.0},
     "sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}},
 }
-# One whose figures nobody reads off: at a single speed its log could not tell thrust, drag and their loss apart.
+# With a single speed, thrust, drag and loss of thrust could not be identified separately.
 SPEEDS = {"multisine": (1.5, 1.0, 1.8, 1.2)}  # [m/s]
 
 
 def default_plan() -> dict:
     """The installed plan: every key of a scenario; start, dock heading and current are distributions."""
-    return merge(Scenario().model_dump(mode="json"), RANDOM)
+    return merge(short.ShortScenario().model_dump(mode="json"), RANDOM)
 
 
 def manoeuvre_plan(kind: str) -> dict:
@@ -67,16 +67,23 @@ def load_plan(path: Path) -> tuple[dict, dict[str, str]]:
     return dict(values), {"": str(path), **document.places}
 
 
-def merge(base: Mapping, override: Mapping) -> dict:
-    """`base` with `override` on top, mapping by mapping; a definite value replaces a distribution."""
+def merge(base: Mapping, override: Mapping, key: str = "") -> dict:
+    """`base` with `override` on top, mapping by mapping; a definite value replaces a distribution.
+
+    The keys beside a `kind` are its own: another kind leaves them behind, but those of an estimator that it shares.
+    """
     if is_distribution(base) or is_distribution(override):
         return dict(override)
+    if key == "":
+        base, override = short.renewed(base), short.renewed(override)
     if "kind" in override and override["kind"] != base.get("kind"):
-        return dict(override)  # the keys beside a kind are its own
+        shared = short.estimator_keys(str(override["kind"])) - {"kind"} if key == "estimator" else set()
+        return {name: value for name, value in base.items() if name in shared} | dict(override)
     merged = dict(base)
-    for key, value in override.items():
-        below = merged.get(key)
-        merged[key] = merge(below, value) if isinstance(below, Mapping) and isinstance(value, Mapping) else value
+    for name, value in override.items():
+        below = merged.get(name)
+        both = isinstance(below, Mapping) and isinstance(value, Mapping)
+        merged[name] = merge(below, value, name) if both else value  # pyright: ignore[reportArgumentType]
     return merged
 
 
@@ -144,7 +151,7 @@ def varied(value: Any, path: str = "", chosen: bool = False) -> Iterator[str]:
 
 
 def check(plan: Mapping, places: Mapping[str, str] | None = None) -> None:
-    """Sees that every distribution of a plan makes sense, also those that are seldom chosen.
+    """Checks every distribution of a plan, also those that are seldom chosen.
 
     Raises:
         InputError: For one whose parameters do not.

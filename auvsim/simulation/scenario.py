@@ -1,27 +1,41 @@
-"""What one trial is made of: the settings that each module owns, composed into one schema."""
+"""The schema of a scenario: water, structures, vehicles, and what each vehicle carries and does."""
 
 import json
 import math
 from collections.abc import Iterator, Mapping
+from typing import Annotated, Any
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, StringConstraints, ValidationError, model_validator
 
 from auvsim.acoustics.link import AcousticSettings
-from auvsim.acoustics.usbl import UsblSettings
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
-from auvsim.control.torpedo import ControlSettings
-from auvsim.missions.docking.guidance import GuidanceSettings
-from auvsim.missions.manoeuvres.settings import ManoeuvreSettings
-from auvsim.navigation.navigator import EstimatorSettings
-from auvsim.physics.world import WorldSettings
-from auvsim.sensors.compass import CompassSettings
-from auvsim.sensors.depth import DepthSettings
-from auvsim.sensors.dvl import DvlSettings
-from auvsim.sensors.feedback import FeedbackSettings
-from auvsim.sensors.gyro import GyroSettings
+from auvsim.control.registry import ControlSettings
+from auvsim.control.torpedo import AutopilotSettings
+from auvsim.missions.docking.guidance import DockingSettings
+from auvsim.missions.registry import MissionSettings
+from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.scenes import Integrator, WorldSettings
+from auvsim.physics.truth import StructurePose
+from auvsim.simulation.sensor_settings import SensorSettings, rated
+from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
+
+Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
+
+
+class DatumSettings(Settings):
+    """Place of the origin of NED on the earth; needed only where latitudes and longitudes are used."""
+
+    latitude: float | None = Field(default=None, ge=-90, le=90, description="latitude of the origin, WGS84 [deg]")
+    longitude: float | None = Field(default=None, ge=-180, le=180, description="longitude of the origin, WGS84 [deg]")
+
+    @model_validator(mode="after")
+    def _whole(self) -> "DatumSettings":
+        if (self.latitude is None) != (self.longitude is None):
+            raise ValueError("latitude and longitude go together: give both or neither")
+        return self
 
 
 class Rates(Settings):
@@ -34,65 +48,92 @@ class Rates(Settings):
 
 
 class Start(Settings):
-    """Where and how the vehicle starts."""
+    """Where and how the vehicle starts: at a place, or at a range and bearing from a structure."""
 
     range: float = Field(default=300.0, gt=0.0, description="horizontal distance from the dock's mouth [m]")
     bearing_deg: float = Field(
         default=0.0,
-        description="direction seen from the dock, clockwise from the axis on the side vehicles come from [deg]",
+        description="bearing from the dock, clockwise from the axis extended out of the mouth [deg]",
+    )
+    north: float | None = Field(default=None, description="with east: a place instead of range and bearing [m]")
+    east: float | None = Field(default=None, description="with north: a place instead of range and bearing [m]")
+    structure: str | None = Field(
+        default=None, description="structure that range and bearing are from; none: the mission's dock, or the only one"
     )
     heading_deg: float = Field(default=0.0, description="heading, clockwise from north [deg]")
     depth: float = Field(default=20.0, ge=0.0, description="depth [m]")
     speed: float = Field(default=1.0, ge=0.0, description="speed through the water, straight ahead [m/s]")
 
+    @model_validator(mode="after")
+    def _whole_place(self) -> "Start":
+        if (self.north is None) != (self.east is None):
+            raise ValueError("north and east go together: give both or neither")
+        return self
+
 
 class VehicleSettings(Settings):
-    """The vehicle and its start."""
+    """One vehicle: what it is, where it starts, what it carries and does."""
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    sensors: SensorSettings = SensorSettings()
+    estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
+    control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
+    mission: MissionSettings = Field(default=DockingSettings(), description="The mission, by its `kind`.")
 
 
-class DockSettings(Settings):
-    """The dock; its mouth is below the origin of north and east."""
+class StructureSettings(Settings):
+    """A dock: its model and where it is."""
 
     model: str = Field(default="dock", description="a folder in models/, or the path of an .xml file")
+    north: float = Field(default=0.0, description="north of the datum, centre of the mouth [m]")
+    east: float = Field(default=0.0, description="east of the datum, centre of the mouth [m]")
     depth: float = Field(default=20.0, gt=0.0, description="depth of the centre of the mouth [m]")
     heading_deg: float = Field(
-        default=0.0, description="course of a vehicle that enters straight, clockwise from north [deg]"
+        default=0.0, description="course of a vehicle that enters along the axis, clockwise from north [deg]"
     )
 
-
-class SensorSettings(Settings):
-    """The sensors on board and at the dock."""
-
-    compass: CompassSettings = CompassSettings()
-    depth: DepthSettings = DepthSettings()
-    feedback: FeedbackSettings = FeedbackSettings()
-    usbl: UsblSettings = UsblSettings()
-    dvl: DvlSettings = DvlSettings()
-    gyro: GyroSettings = GyroSettings()
+    @property
+    def pose(self) -> StructurePose:
+        """Where it is."""
+        return StructurePose(north=self.north, east=self.east, depth=self.depth, heading=math.radians(self.heading_deg))
 
 
-class Scenario(Settings):
-    """One trial, with every number definite."""
+class WaterSettings(Settings):
+    """The water and its floor."""
 
-    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the trial [s]")
-    rates: Rates = Rates()
-    vehicle: VehicleSettings = VehicleSettings()
-    dock: DockSettings = DockSettings()
+    density: float = Field(default=WorldSettings().water_density, gt=0, description="density of the water [kg/m3]")
+    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
     current: CurrentSettings = Field(
         default=UniformSettings(speed=0.0), description="The water's velocity, by its `kind`."
     )
-    sensors: SensorSettings = SensorSettings()
-    acoustics: AcousticSettings = AcousticSettings()
-    estimator: EstimatorSettings = EstimatorSettings()
-    guidance: GuidanceSettings = GuidanceSettings()
-    control: ControlSettings = ControlSettings()
-    world: WorldSettings = WorldSettings()
-    manoeuvre: ManoeuvreSettings | None = Field(
-        default=None, description="what the vehicle does instead of docking, by its `kind`"
+
+
+class PhysicsSettings(Settings):
+    """How the dynamics are stepped."""
+
+    integrator: Integrator = Field(
+        default=WorldSettings().integrator, description=WorldSettings.model_fields["integrator"].description
     )
+
+
+class NetworkSettings(Settings):
+    """What carries messages."""
+
+    acoustics: AcousticSettings = AcousticSettings()
+
+
+class Scenario(Settings):
+    """One run, with every number definite."""
+
+    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the run [s]")
+    rates: Rates = Rates()
+    datum: DatumSettings = DatumSettings()
+    physics: PhysicsSettings = PhysicsSettings()
+    water: WaterSettings = WaterSettings()
+    network: NetworkSettings = NetworkSettings()
+    structures: dict[Name, StructureSettings] = Field(default={}, description="docks, by name")
+    vehicles: dict[Name, VehicleSettings] = Field(min_length=1, description="vehicles, by name")
 
     @model_validator(mode="after")
     def _rates_divide(self) -> "Scenario":
@@ -104,12 +145,77 @@ class Scenario(Settings):
         return self
 
     @model_validator(mode="after")
-    def _manoeuvre_fits(self) -> "Scenario":
-        if self.manoeuvre is not None and self.manoeuvre.duration > self.duration:
-            raise ValueError(
-                f"duration: {self.duration:g} s is too short for a manoeuvre of {self.manoeuvre.duration:g} s"
-            )
+    def _missions_fit(self) -> "Scenario":
+        for name, vehicle in self.vehicles.items():
+            wanted = getattr(getattr(vehicle.mission, "manoeuvre", None), "duration", 0.0)
+            if wanted > self.duration:
+                raise ValueError(f"duration: {self.duration:g} s is too short for a manoeuvre of {wanted:g} s")
+            for key, structure in self._structures_named(name):
+                if structure is not None and structure not in self.structures:
+                    raise ValueError(f"{key}: no structure '{structure}'; there are {self._known}")
+            if vehicle.start.north is None and self.dock_of(name, vehicle.start.structure) is None:
+                key = f"vehicles.{name}.start.structure"
+                raise ValueError(f"{key}: range and bearing are from a structure; name one of {self._known}, or give "
+                                 "north and east")  # fmt: skip
         return self
+
+    @model_validator(mode="after")
+    def _all_in_the_water(self) -> "Scenario":
+        floor = self.water.sea_floor
+        depths = [(f"structures.{name}.depth", structure.depth) for name, structure in self.structures.items()]
+        depths += [(f"vehicles.{name}.start.depth", vehicle.start.depth) for name, vehicle in self.vehicles.items()]
+        for key, depth in depths:
+            if not 0.0 < depth < floor:
+                raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
+        return self
+
+    @property
+    def lone(self) -> tuple[str, VehicleSettings]:
+        """Name and settings of the only vehicle.
+
+        Raises:
+            InputError: there are several.
+        """
+        if len(self.vehicles) != 1:
+            raise InputError(f"the scenario has {len(self.vehicles)} vehicles ({', '.join(self.vehicles)}), not one")
+        return next(iter(self.vehicles.items()))
+
+    @property
+    def world(self) -> WorldSettings:
+        """What the physics needs."""
+        return WorldSettings(
+            integrator=self.physics.integrator,
+            water_density=self.water.density,
+            sea_floor=self.water.sea_floor,
+        )
+
+    def dock_of(self, vehicle: str, structure: str | None = None) -> str | None:
+        """The structure that a vehicle's settings mean: the one given, its mission's, or the only one; else None."""
+        named = structure or getattr(self.vehicles[vehicle].mission, "dock", None)
+        if named is None and len(self.structures) == 1:
+            return next(iter(self.structures))
+        return named
+
+    def start_position(self, vehicle: str) -> tuple[float, float, float]:
+        """North, east, down [m] of a vehicle's start."""
+        start = self.vehicles[vehicle].start
+        if start.north is not None and start.east is not None:
+            return start.north, start.east, start.depth
+        dock = self.structures[self.dock_of(vehicle, start.structure) or ""]
+        direction = math.radians(dock.heading_deg + 180.0 + start.bearing_deg)
+        north, east = start.range * math.cos(direction), start.range * math.sin(direction)
+        return north + dock.north, east + dock.east, start.depth
+
+    @property
+    def _known(self) -> str:
+        return ", ".join(self.structures) or "none"
+
+    def _structures_named(self, vehicle: str) -> Iterator[tuple[str, str | None]]:
+        """Dotted key and name of every structure that a vehicle's settings name."""
+        settings = self.vehicles[vehicle]
+        yield f"vehicles.{vehicle}.mission.dock", getattr(settings.mission, "dock", None)
+        yield f"vehicles.{vehicle}.sensors.usbl.dock", settings.sensors.usbl.dock
+        yield f"vehicles.{vehicle}.start.structure", settings.start.structure
 
     def _ratios(self) -> Iterator[tuple[str, float, str, float]]:
         """Key, rate, and the name and value of the rate that it must divide."""
@@ -117,18 +223,15 @@ class Scenario(Settings):
         yield "rates.control", rates.control, "physics", rates.physics
         yield "rates.filter", rates.filter, "control", rates.control
         yield "rates.log", rates.log, "control", rates.control
-        for name in SensorSettings.model_fields:
-            sensor = getattr(self.sensors, name)
-            rate = getattr(sensor, "rate", None)
-            # The USBL has a period with jitter instead; a sensor that the vehicle does not have sets no limit.
-            if rate is not None and getattr(sensor, "enabled", True):
-                yield f"sensors.{name}.rate", rate, "control", rates.control
+        for name, vehicle in self.vehicles.items():
+            for sensor, rate in rated(vehicle.sensors):
+                yield f"vehicles.{name}.sensors.{sensor}.rate", rate, "control", rates.control
 
 
 def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
-    """A scenario of nested values; what they leave out has its default.
+    """A scenario of nested values, in full or, without the key `vehicles`, in the short form for one vehicle.
 
-    Strict: no text or truth value passes for a number.
+    Values that are left out have their defaults. Strict: a text or truth value is no number.
 
     Args:
         values: As read from YAML.
@@ -137,10 +240,23 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
     Raises:
         InputError: One line with the key, its value and what would be right.
     """
+    from auvsim.simulation import short
+
+    if "vehicles" not in values:
+        return short.parse(values, places)
+    return validated(Scenario, values, places or {})
+
+
+def validated(model: type[Settings], values: Mapping, places: Mapping[str, str]) -> Any:
+    """Settings of nested values, with errors in one line.
+
+    Raises:
+        InputError: One line with the key, its value and what would be right.
+    """
     try:
-        return Scenario.model_validate_json(json.dumps(values, default=str), strict=True)
+        return model.model_validate_json(json.dumps(values, default=str), strict=True)
     except ValidationError as error:
-        raise schema.explain(error, Scenario, values, places or {}) from None
+        raise schema.explain(error, model, values, places) from None
 
 
 def to_yaml(scenario: Scenario) -> str:
@@ -149,7 +265,7 @@ def to_yaml(scenario: Scenario) -> str:
 
 
 def from_yaml(text: str, source: str = "scenario") -> Scenario:
-    """The scenario that `to_yaml` wrote.
+    """The scenario of a YAML text, such as a log holds, of this form or an earlier one.
 
     Raises:
         InputError: If it is no YAML or no scenario.
@@ -158,13 +274,6 @@ def from_yaml(text: str, source: str = "scenario") -> Scenario:
     if not isinstance(document.value, Mapping):
         raise InputError(f"{source}: a scenario is a mapping of keys to values")
     return parse(document.value, {"": source, **document.places})
-
-
-def start_position(scenario: Scenario) -> tuple[float, float, float]:
-    """North, east, down [m] of the vehicle's start."""
-    start = scenario.vehicle.start
-    direction = math.radians(scenario.dock.heading_deg + 180.0 + start.bearing_deg)
-    return start.range * math.cos(direction), start.range * math.sin(direction), start.depth
 
 
 def _divisors(rate: float, faster: float) -> str:

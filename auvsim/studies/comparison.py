@@ -1,25 +1,19 @@
-"""The same docking trials with one estimator after another, in steady and in turning currents, on MuJoCo truth.
+"""The same docking trials with one estimator after another, in steady and in turning currents, on MuJoCo truth."""
 
-From the checkout: `python -m auvsim.studies.comparison --trials 100 --seed 9`.
-"""
-
-import argparse
 import math
-import multiprocessing
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, Literal
 
-from rich.console import Console
-from rich.progress import Progress
+from rich.console import RenderableType
 from rich.table import Table
 
-from auvsim.missions.docking.metrics import Summary, summarise, wilson
-from auvsim.navigation.navigator import FACTORIES
-from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.analysis.statistics import wilson
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.navigation.registry import ESTIMATORS as FACTORIES
+from auvsim.studies.trials import Summary, docking_trial
 
 LATER = 3  # attempts that the default guidance has
 
@@ -37,9 +31,25 @@ CELLS: Mapping[str, Mapping[str, Any]] = MappingProxyType(
 )
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    trials: int = 100
+    """Trials with each estimator in each current."""
+    seed: int = 9
+    """Seed of every random number."""
+    cells: tuple[Literal["steady", "turning", "turning, 2 s fixes"], ...] = ("steady", "turning", "turning, 2 s fixes")
+    """Currents."""
+    estimators: tuple[str, ...] = tuple(FACTORIES)
+    """Estimators; by default all that have a name."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Score:
-    """What one estimator came to over the trials of a cell."""
+    """Results of one estimator over the trials of a cell."""
 
     trials: int
     first: int  # docked on the first attempt
@@ -50,21 +60,19 @@ class Score:
 
 
 def run_one(cell: str, estimator: str, seed: int, trial: int) -> Summary:
-    """One trial of a cell: the same truth, start and noises for each estimator.
+    """Runs one trial of a cell: the same truth, start and noises for each estimator.
 
     Args:
-        cell: Of CELLS.
-        estimator: As `estimator.factory` of a scenario.
-        seed: Of all random streams.
+        cell: One of CELLS.
+        estimator: Estimator, as `estimator.factory` of a scenario.
+        seed: Seed of all random streams.
         trial: Number of the trial under that seed.
     """
-    plan = sampling.merge(sampling.default_plan(), CELLS[cell])
-    plan = sampling.merge(plan, {"estimator": {"factory": estimator}})
-    return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
+    return docking_trial(seed, trial, CELLS[cell], {"estimator": {"factory": estimator}})
 
 
 def score(summaries: Sequence[Summary]) -> Score:
-    """The score of trials of one cell and estimator; all estimates weigh alike."""
+    """Scores the trials of one cell and estimator, weighting all estimates equally."""
     docked = [s for s in summaries if s.docked]
     qualities = [s.estimate["all"] for s in summaries]
     positions = [(q.samples, q.position_rms**2) for q in qualities if q.position_rms is not None]
@@ -85,35 +93,27 @@ def run_study(
     cells: Sequence[str] = tuple(CELLS),
     estimators: Sequence[str] = tuple(FACTORIES),
     *,
-    workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
 ) -> dict[tuple[str, str], tuple[Summary, ...]]:
-    """The summaries of trials 0 .. trials-1 of a seed, by cell and estimator.
+    """Runs trials 0 .. trials-1 of a seed and returns their summaries by cell and estimator.
 
     Args:
-        trials: How many of each cell and estimator.
-        seed: Of all of them.
-        cells: Of CELLS.
-        estimators: Factories.
-        workers: Processes; all cores if None.
-        progress: Called with the number of trials done.
+        trials: Number of trials in each cell with each estimator.
+        seed: Seed of all of them.
+        cells: Some of CELLS.
+        estimators: Names of estimators.
+        jobs: Number of processes; one per core if None.
+        progress: Called with the number of trials done and their total.
     """
-    # Spawned, not forked: MuJoCo, OpenGL and BLAS may hold threads and locks of this process.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {
-            (cell, name): [pool.submit(run_one, cell, name, seed, trial) for trial in range(trials)]
-            for cell in cells
-            for name in estimators
-        }
-        for done, future in enumerate(as_completed([f for row in futures.values() for f in row]), start=1):
-            future.result()
-            if progress:
-                progress(done)
-        return {key: tuple(future.result() for future in row) for key, row in futures.items()}
+    keys = [(cell, name) for cell in cells for name in estimators]
+    tasks = [Task(key=(*key, n), work=partial(run_one, *key, seed, n)) for key in keys for n in range(trials)]
+    done = run_tasks(tasks, jobs, progress)
+    return {key: tuple(done[*key, n] for n in range(trials)) for key in keys}
 
 
 def table(study: Mapping[tuple[str, str], Sequence[Summary]], seed: int) -> Table:
-    """A row of each cell and estimator."""
+    """Makes a table with one row for each cell and estimator."""
     count = max(map(len, study.values()), default=0)
     result = Table(title=f"{count} docking trials in 0.5 m/s, seed {seed}, the same for each estimator")
     for heading in ("current", "estimator"):
@@ -138,46 +138,28 @@ def table(study: Mapping[tuple[str, str], Sequence[Summary]], seed: int) -> Tabl
     return result
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; `arguments` are those of the command line if None."""
-    parser = argparse.ArgumentParser(description="The same docking trials with each estimator on all cores.")
-    parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=9)
-    parser.add_argument("--cells", nargs="+", choices=CELLS, default=list(CELLS))
-    parser.add_argument("--estimators", nargs="+", default=list(FACTORIES), help="all that have a name if not given")
-    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
-    options = parser.parse_args(arguments)
-    total = options.trials * len(options.cells) * len(options.estimators)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("trials", total=total)
-        study = run_study(
-            options.trials,
-            options.seed,
-            options.cells,
-            options.estimators,
-            workers=options.workers,
-            progress=lambda done: bar.update(task, completed=done),
-        )
-    console = Console(width=None if Console().is_terminal else 120)
-    console.print(table(study, options.seed))
-    for (cell, name), summaries in study.items():
-        for number, s in enumerate(summaries):
-            if not s.docked:
-                console.print(f"{cell}, {name}, trial {number}: {s.failure_text}", highlight=False)
+def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
+    """Runs the study; returns its table and a line for each trial that did not dock."""
+    study = run_study(
+        options.trials, options.seed, options.cells, options.estimators, jobs=options.jobs, progress=progress
+    )
+    failures = [
+        f"{cell}, {name}, trial {number}: {s.failure_text}"
+        for (cell, name), summaries in study.items()
+        for number, s in enumerate(summaries)
+        if not s.docked
+    ]
+    return [table(study, options.seed), *failures]
 
 
 def _share(successes: int, trials: int) -> str:
-    """A rate with its 95 % Wilson interval."""
+    """Formats a rate with its 95 % Wilson interval."""
     low, high = wilson(successes, trials)
     rate = 100.0 * successes / trials if trials else math.nan
     return f"{rate:.0f} ({100.0 * low:.0f}-{100.0 * high:.0f})"
 
 
 def _mean(pairs: Sequence[tuple[float, float]]) -> float:
-    """Weighted mean of (weight, value); NaN of nothing."""
+    """Weighted mean of (weight, value) pairs; NaN if there are none."""
     total = sum(weight for weight, _ in pairs)
     return sum(weight * value for weight, value in pairs) / total if total else math.nan
-
-
-if __name__ == "__main__":
-    main()

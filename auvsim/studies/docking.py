@@ -1,46 +1,51 @@
-"""Random docking trials of one seed on all cores, and what they come to.
+"""Random docking trials of one seed."""
 
-From the checkout: `python -m auvsim.studies.docking --trials 100 --seed 7`.
-"""
-
-import argparse
 import math
-import multiprocessing
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from statistics import median
 
-from rich.console import Console
-from rich.progress import Progress
+from rich.console import RenderableType
 from rich.table import Table
 
-from auvsim.missions.docking.metrics import Summary, summarise, wilson
-from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.analysis.statistics import wilson
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.studies.trials import Summary, docking_trial
 
 LATER = 3  # attempts that the default guidance has
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    trials: int = 100
+    """Number of trials."""
+    seed: int = 7
+    """Seed of every random number."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Study:
-    """The summaries of trials 0 .. n-1 of one seed."""
+    """Summaries of trials 0 .. n-1 of one seed."""
 
     seed: int
     summaries: tuple[Summary, ...]
 
     def docked_within(self, attempts: int) -> int:
-        """How many trials docked within so many attempts."""
+        """Number of trials that docked within a number of attempts."""
         return sum(s.docked and s.attempts <= attempts for s in self.summaries)
 
     @property
     def docked(self) -> list[Summary]:
-        """The trials that docked."""
+        """Summaries of the trials that docked."""
         return [s for s in self.summaries if s.docked]
 
     def estimate_rms(self, quantity: str, phase: str = "all") -> float:
-        """Root mean square over all estimates of all trials in a phase, of `position_rms` or the like; NaN if none."""
+        """Rms error over all estimates of all trials in a phase; `quantity` such as `position_rms`."""
         pairs = [(q.samples, getattr(q, quantity)) for s in self.summaries if (q := s.estimate.get(phase))]
         pairs = [(samples, value) for samples, value in pairs if value is not None]
         total = sum(samples for samples, _ in pairs)
@@ -48,11 +53,11 @@ class Study:
 
     @property
     def nees_per_dof(self) -> float:
-        """Mean over trials of the normalised error squared of the horizontal position, for each degree of freedom."""
+        """Mean over trials of the NEES of the horizontal position per degree of freedom."""
         return _mean(_known(s.estimate["all"].nees_per_dof for s in self.summaries))
 
     def failures(self) -> list[str]:
-        """One line for each trial that did not dock: its number, reason, and the log's words."""
+        """One line for each trial that did not dock: its number, reason, and the event's text."""
         return [
             f"trial {number}: {s.failure_reason}: {s.failure_text}"
             for number, s in enumerate(self.summaries)
@@ -64,41 +69,30 @@ class Study:
         return [f"trial {n}: attempt {s.attempts}" for n, s in enumerate(self.summaries) if s.docked and s.attempts > 1]
 
 
-def run_one(trial: int, seed: int, pinned: Mapping) -> Summary:
-    """One trial of the default plan with some values pinned."""
-    plan = sampling.merge(sampling.default_plan(), pinned)
-    return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
-
-
 def run_study(
     trials: int,
     seed: int,
     pinned: Mapping | None = None,
-    workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    *,
+    jobs: int | None = None,
+    progress: Progress | None = None,
 ) -> Study:
-    """Runs trials 0 .. trials-1 of a seed in processes of their own.
+    """Runs trials 0 .. trials-1 of a seed.
 
     Args:
-        trials: how many.
-        seed: of all of them.
-        pinned: nested values on top of the default plan.
-        workers: processes; all cores if None.
-        progress: called with the number of trials done.
+        trials: Number of trials.
+        seed: Seed of all of them.
+        pinned: Nested values on top of the default plan.
+        jobs: Number of processes; one per core if None.
+        progress: Called with the number of trials done and their total.
     """
-    work = partial(run_one, seed=seed, pinned=pinned or {})
-    # Spawned, not forked: MuJoCo, OpenGL and BLAS may hold threads and locks of this process.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = [pool.submit(work, trial) for trial in range(trials)]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            if progress:
-                progress(done)
-        return Study(seed=seed, summaries=tuple(future.result() for future in futures))
+    tasks = [Task(key=(n,), work=partial(docking_trial, seed, n, pinned or {})) for n in range(trials)]
+    done = run_tasks(tasks, jobs, progress)
+    return Study(seed=seed, summaries=tuple(done[n,] for n in range(trials)))
 
 
 def table(study: Study) -> Table:
-    """What the study came to."""
+    """Makes a table of success rates, accuracy at the mouth, contact and estimation errors."""
     count, docked = len(study.summaries), study.docked
     result = Table("quantity", "value", "unit", title=f"{count} docking trials, seed {study.seed}")
 
@@ -121,7 +115,7 @@ def table(study: Study) -> Table:
     for phase in ("all", "homing", "approach", "final", "go_around"):
         values = (study.estimate_rms("position_rms", phase), study.estimate_rms("current_rms", phase))
         row(f"estimate rms, {phase}: position and current", values, "m, m/s", ".3f")
-    row("NEES of position for each degree of freedom", (study.nees_per_dof,), "1 expected")
+    row("NEES of position per degree of freedom", (study.nees_per_dof,), "1 expected")
     inside = _known(s.estimate["all"].coverage_95 for s in study.summaries)
     row("truth inside the 95 % ellipse", (100.0 * _mean(inside),), "%", ".0f")
     factors = _known(s.real_time_factor for s in study.summaries)
@@ -129,27 +123,13 @@ def table(study: Study) -> Table:
     return result
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; `arguments` are those of the command line if None."""
-    parser = argparse.ArgumentParser(description="Random docking trials of the default plan on all cores.")
-    parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=7)
-    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
-    options = parser.parse_args(arguments)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("trials", total=options.trials)
-        study = run_study(
-            options.trials,
-            options.seed,
-            workers=options.workers,
-            progress=lambda done: bar.update(task, completed=done),
-        )
-    console = Console(width=None if Console().is_terminal else 120)
-    console.print(table(study))
-    for line in study.failures() or ["no trial failed"]:
-        console.print(line, highlight=False)
+def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
+    """Runs the study; returns its table and a line for each trial that did not dock at once."""
+    study = run_study(options.trials, options.seed, jobs=options.jobs, progress=progress)
+    lines = study.failures() or ["no trial failed"]
     if study.go_arounds():
-        console.print("docked later:", "; ".join(study.go_arounds()), highlight=False)
+        lines.append(f"docked later: {'; '.join(study.go_arounds())}")
+    return [table(study), *lines]
 
 
 def _known(values: Iterable[float | None]) -> list[float]:
@@ -166,7 +146,3 @@ def _rms(values: list[float]) -> float:
 
 def _middle_and_max(values: list[float]) -> tuple[float, float]:
     return (median(values), max(values)) if values else (math.nan, math.nan)
-
-
-if __name__ == "__main__":
-    main()

@@ -1,53 +1,58 @@
-"""Identification from 300 s of manoeuvres of the MuJoCo vehicle, judged on manoeuvres of other kinds.
+"""Identification from 300 s of manoeuvres of the MuJoCo vehicle, judged by predicting manoeuvres of other kinds."""
 
-From the checkout: `python -m auvsim.studies.held_out --seeds 10 --first 50`.
-"""
-
-import argparse
 import math
-import multiprocessing
 import tempfile
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
+from rich.console import RenderableType
 from rich.table import Table
 
-from auvsim.data import log
+from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification.pipeline import STEPS, identify
 from auvsim.identification.readers import read
-from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.studies.trials import record_manoeuvre
 
-FITTED = {"multisine": 150.0, "zigzag": 150.0}  # duration of each, approach and all [s]
+FITTED = {"multisine": 150.0, "zigzag": 150.0}  # duration of each, including the approach [s]
 HELD_OUT = {"circle": 300.0, "spiral": None}  # None: as long as it takes
 FIRST_SEED = 50  # none from there on was used while the fits were built
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    seeds: int = 10
+    """Number of seeds."""
+    first: int = FIRST_SEED
+    """The first seed."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outcome:
-    """What the identification of one seed came to."""
+    """Result of the identification of one seed."""
 
     seed: int
-    shares: dict[str, float]  # position error after 120 s by the distance run, rms over starts, by what was held out
-    start_shares: dict[str, float]  # the same of the condensed model it started from
+    shares: dict[str, float]  # position error after 120 s relative to distance run, rms over starts, by manoeuvre
+    start_shares: dict[str, float]  # the same of the model that the fit started from
     converged: bool
 
 
 def run_one(seed: int, fitted: dict[str, float], held_out: dict[str, float | None], steps: Sequence[str]) -> Outcome:
-    """Drives, identifies and judges.
+    """Runs the manoeuvres of one seed, identifies the model and predicts those held out.
 
     Args:
-        seed: Of the current, of all noises and constant errors.
+        seed: Seed of the current, of all noises and constant errors.
         fitted, held_out: Kinds of manoeuvres and their durations [s].
-        steps: Of the identification.
+        steps: Steps of the identification.
     """
     with tempfile.TemporaryDirectory() as folder:
-        paths = {kind: _drive(kind, time, seed, Path(folder)) for kind, time in {**fitted, **held_out}.items()}
+        paths = {kind: _record(kind, time, seed, Path(folder)) for kind, time in {**fitted, **held_out}.items()}
         found = identify(read([paths[kind] for kind in fitted]), read([paths[kind] for kind in held_out]), steps=steps)
     return Outcome(
         seed=seed,
@@ -57,11 +62,10 @@ def run_one(seed: int, fitted: dict[str, float], held_out: dict[str, float | Non
     )
 
 
-def _drive(kind: str, duration: float | None, seed: int, folder: Path) -> Path:
+def _record(kind: str, duration: float | None, seed: int, folder: Path) -> Path:
     pinned = {} if duration is None else {"manoeuvre": {"kind": kind, "duration": duration}}
-    plan = sampling.merge(sampling.manoeuvre_plan(kind), pinned)
     path = folder / f"{kind}.nc"
-    log.write(run_trial(scenario.parse(sampling.draw(plan, seed, 0)), seed=seed, trial=0), path)
+    record_manoeuvre(kind, seed, path, pinned)
     return path
 
 
@@ -71,24 +75,20 @@ def run_study(
     held_out: dict[str, float | None] | None = None,
     steps: Sequence[str] = STEPS,
     *,
-    workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
 ) -> list[Outcome]:
-    """The outcomes of seeds, in their order; `progress` is called with how many are done."""
-    jobs = fitted or FITTED, held_out or HELD_OUT, steps
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = [pool.submit(run_one, seed, *jobs) for seed in seeds]
-        for done, future in enumerate(as_completed(futures), start=1):
-            future.result()
-            if progress:
-                progress(done)
-        return [future.result() for future in futures]
+    """Returns the outcomes of seeds in their order, see `run_one`; `progress` is called with seeds done and total."""
+    arguments = fitted or FITTED, held_out or HELD_OUT, steps
+    tasks = [Task(key=(seed,), work=partial(run_one, seed, *arguments)) for seed in seeds]
+    done = run_tasks(tasks, jobs, progress)
+    return [done[seed,] for seed in seeds]
 
 
 def table(outcomes: Sequence[Outcome]) -> Table:
-    """A row of each seed, then the median and the largest."""
+    """Makes a table with one row for each seed, then the median and the largest."""
     kinds = list(outcomes[0].shares)
-    result = Table(title="Position error after 120 s open loop, by the distance run")
+    result = Table(title="Position error after 120 s open loop, relative to the distance run")
     for heading in ("seed", *kinds, *(f"{kind}, its start" for kind in kinds), "converged"):
         result.add_column(heading, justify="right")
     for one in outcomes:
@@ -105,22 +105,7 @@ def _percent(share: float) -> str:
     return f"{100.0 * share:.2f} %" if math.isfinite(share) else "-"
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; `arguments` are those of the command line if None."""
-    parser = argparse.ArgumentParser(description="Identification of the MuJoCo vehicle, judged on other manoeuvres.")
-    parser.add_argument("--seeds", type=int, default=10)
-    parser.add_argument("--first", type=int, default=FIRST_SEED)
-    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
-    options = parser.parse_args(arguments)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("seeds", total=options.seeds)
-        outcomes = run_study(
-            range(options.first, options.first + options.seeds),
-            workers=options.workers,
-            progress=lambda done: bar.update(task, completed=done),
-        )
-    Console(width=None if Console().is_terminal else 120).print(table(outcomes))
-
-
-if __name__ == "__main__":
-    main()
+def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
+    """Runs the study and returns its table."""
+    seeds = range(options.first, options.first + options.seeds)
+    return [table(run_study(seeds, jobs=options.jobs, progress=progress))]

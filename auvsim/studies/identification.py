@@ -1,21 +1,17 @@
-"""Fits of planar vehicles whose parameters are known: coverage, convergence, noise of the process.
+"""Fits of planar vehicles whose parameters are known: coverage, convergence, process noise."""
 
-From the checkout: `python -m auvsim.studies.identification --seeds 50`.
-"""
-
-import argparse
 import math
-import multiprocessing
 from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
-from rich.console import Console
-from rich.progress import Progress
+from rich.console import RenderableType
 from rich.table import Table
 
+from auvsim.analysis.statistics import wilson
+from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, Fit, with_values
 from auvsim.identification.identifiability import WEAK, assess, sizes
@@ -23,7 +19,6 @@ from auvsim.identification.prediction_error import PredictionErrorOptions, fit_p
 from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.identification.simulated import SHEETS, Vessel, simulate
 from auvsim.identification.states import first_belief
-from auvsim.missions.docking.metrics import wilson
 from auvsim.physics.planar_fit import fit_planar_model
 from estimators.core.consistency import nees
 from estimators.core.types import Array
@@ -37,9 +32,19 @@ OPTIONS = SegmentOptions(nuisances=SHEETS)
 SETTLED = 200  # samples after which a filter has forgotten its start
 
 
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    seeds: int = 50
+    """Records of the coverage; a quarter as many, and at least twelve, of the other parts."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Case:
-    """A vehicle, what is free of it, and how it starts."""
+    """A vehicle, its free parameters, and how it starts."""
 
     parameters: PlanarParameters
     free: tuple[str, ...]
@@ -47,19 +52,19 @@ class Case:
     surge: float
 
     def vessel(self, densities: Sequence[float] = (0.0,) * 6) -> Vessel:
-        """It, with noise of the process."""
+        """Returns the vehicle with process noise of given densities."""
         return Vessel(
             parameters=self.parameters, shaft_speed=self.shaft_speed, surge=self.surge, densities=tuple(densities)
         )
 
     @property
     def values(self) -> Array:
-        """The true free parameters (k,)."""
+        """True values of the free parameters (k,)."""
         return np.array([getattr(self.parameters, name) for name in self.free])
 
 
 def case(name: str) -> Case:
-    """remus100, condensed at 1 m/s, or prestero."""
+    """Returns the case `remus100`, fitted to MuJoCo's forces at 1 m/s, or `prestero`."""
     if name == "prestero":
         return Case(parameters=PRESTERO, free=PRESTERO_FREE, shaft_speed=0.0, surge=0.8)
     condensed = fit_planar_model("remus100", 1.0)
@@ -70,14 +75,14 @@ def case(name: str) -> Case:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Covered:
-    """A fit beside the truth."""
+    """Errors of a fit."""
 
-    scores: Array  # (k,) errors of the free parameters in units of the fit's own deviations
+    scores: Array  # (k,) errors of the free parameters in units of the fit's own standard deviations
     converged: bool
 
 
 def coverage(name: str, seed: int, duration: float = 300.0) -> Covered:
-    """A fit from a start of which each parameter is wrong by up to a half, as the seed draws it."""
+    """Fits from a start in which each parameter is wrong by up to a half, as drawn from the seed."""
     truth = case(name)
     run = simulate(truth.vessel(), "multisine", seed, duration)
     fit = fit_segments([run.record], _wrong(truth, seed), truth.free, OPTIONS)
@@ -90,9 +95,10 @@ def _wrong(truth: Case, seed: int) -> PlanarParameters:
 
 
 def convergence(seed: int, factor: float, duration: float = 300.0) -> float:
-    """Largest difference, in deviations, between fits from the truth and from a start wrong by `factor`; 0: from zero.
+    """Returns the largest difference between fits from the true and from a wrong start, in standard deviations.
 
-    Each parameter is too large or too small by it, as the seed draws it. Infinite where a fit has not converged.
+    Each parameter of the wrong start is too large or too small by `factor`, as drawn from the seed; 0 starts from
+    zeros. Infinite where a fit has not converged.
     """
     truth = case("remus100")
     run = simulate(truth.vessel(), "multisine", seed, duration)
@@ -107,17 +113,17 @@ def convergence(seed: int, factor: float, duration: float = 300.0) -> float:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Noisy:
-    """What one record with noise of the process gave."""
+    """Results of one record with process noise."""
 
     polished: float  # median error of identifiable combinations, prediction error [relative]
     output: float  # that of output-error fitting
     worst_output: float  # the largest of those
     covered: Covered  # the polished parameters beside the truth
-    nees: float  # of the filter with fitted parameters and noise, a degree of freedom
+    nees: float  # of the filter with fitted parameters and noise, per degree of freedom
 
 
 def noisy(seed: int, duration: float = 300.0) -> Noisy:
-    """Prediction error, from a start wrong by up to a half, and output-error fitting, from the truth, of one record."""
+    """Fits one record by prediction error, from a start wrong by up to a half, and by output error, from the truth."""
     truth = case("remus100")
     run = simulate(truth.vessel(NOISE), "multisine", seed, duration)
     whole = SegmentOptions(nuisances=SHEETS, length=math.inf)
@@ -139,7 +145,7 @@ def noisy(seed: int, duration: float = 300.0) -> Noisy:
 
 
 def filter_nees(fit: Fit, record: Any, states: Array) -> float:
-    """NEES a degree of freedom of position, heading and velocities, of a filter that believes a fit."""
+    """NEES per degree of freedom of position, heading and velocities, of a filter with a fit's parameters and noise."""
     assert fit.noise is not None
     mean, covariance = first_belief(record, fit.parameters, SHEETS.vector())
     q = np.zeros(12)
@@ -152,44 +158,36 @@ def filter_nees(fit: Fit, record: Any, states: Array) -> float:
     return float(np.mean(nees(means[late, :6], covariances[late, :6, :6], states[late, :6], (2,)))) / 6.0
 
 
-def run_study(
-    seeds: int, *, workers: int | None = None, progress: Callable[[int, int], None] | None = None
-) -> dict[str, list[Any]]:
-    """All that the table shows, by name of the part.
+def run_study(seeds: int, *, jobs: int | None = None, progress: Progress | None = None) -> dict[str, list[Any]]:
+    """Runs all fits and returns their results by part of the study.
 
     Args:
-        seeds: Of the coverage; a quarter as many, and twelve at least, of the others.
-        workers: Processes; all cores if None.
-        progress: Called with how many fits are done, and of how many.
+        seeds: Number of records of the coverage; a quarter as many, and at least twelve, of the others.
+        jobs: Number of processes; one per core if None.
+        progress: Called with the number of fits done and their total.
     """
     few = max(12, seeds // 4)
     first = FIRST_SEED
-    jobs: dict[str, list[tuple[Callable, tuple]]] = {
-        "coverage remus100": [(coverage, ("remus100", first + s)) for s in range(seeds)],
-        "coverage prestero": [(coverage, ("prestero", first + s)) for s in range(seeds)],
-        "starts": [(convergence, (first + s, 5.0)) for s in range(12)],
-        "zero": [(convergence, (first + s, 0.0)) for s in range(12)],
-        "noisy": [(noisy, (first + s,)) for s in range(few)],
+    parts: dict[str, list[Callable[[], Any]]] = {
+        "coverage remus100": [partial(coverage, "remus100", first + s) for s in range(seeds)],
+        "coverage prestero": [partial(coverage, "prestero", first + s) for s in range(seeds)],
+        "starts": [partial(convergence, first + s, 5.0) for s in range(12)],
+        "zero": [partial(convergence, first + s, 0.0) for s in range(12)],
+        "noisy": [partial(noisy, first + s) for s in range(few)],
     }
-    # Spawned, not forked: BLAS may hold threads and locks of this process.
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {name: [pool.submit(job, *given) for job, given in row] for name, row in jobs.items()}
-        flat = [future for row in futures.values() for future in row]
-        for done, future in enumerate(as_completed(flat), start=1):
-            future.result()
-            if progress:
-                progress(done, len(flat))
-        return {name: [future.result() for future in row] for name, row in futures.items()}
+    tasks = [Task(key=(name, s), work=work) for name, part in parts.items() for s, work in enumerate(part)]
+    done = run_tasks(tasks, jobs, progress)
+    return {name: [done[name, s] for s in range(len(part))] for name, part in parts.items()}
 
 
 def share_inside(fits: Sequence[Covered]) -> tuple[int, int]:
-    """How many errors lie inside their 95 % interval, and of how many; fits that have not converged count too."""
+    """Returns how many errors lie inside their 95 % interval, and their number; unconverged fits count too."""
     together = np.abs(np.concatenate([fit.scores for fit in fits]))
     return int(np.sum(together <= 1.96)), together.size
 
 
 def table(study: dict[str, list[Any]]) -> Table:
-    """One row of each claim."""
+    """Makes a table with one row for each claim."""
     result = Table(title="Fits of 300 s of a planar vehicle whose parameters are known")
     for heading in ("what", "found", "wanted"):
         result.add_column(heading)
@@ -203,29 +201,18 @@ def table(study: dict[str, list[Any]]) -> Table:
     rows = study["noisy"]
     result.add_section()
     worst = f"{100.0 * float(np.median([row.worst_output for row in rows])):.0f} %"
-    result.add_row("noise of the process: median error, prediction error", _percent([r.polished for r in rows]), "10 %")
+    result.add_row("process noise: median error, prediction error", _percent([r.polished for r in rows]), "10 %")
     result.add_row("the same, output error (worst combination)", f"{_percent([r.output for r in rows])} ({worst})", "")
     result.add_row("parameters inside their 95 % interval", _covered([r.covered for r in rows]), "")
     values = [row.nees for row in rows]
     found = f"{np.mean(values):.2f} (single records {min(values):.2f} to {max(values):.2f})"
-    result.add_row("NEES a degree of freedom", found, "0.8 to 1.3")
+    result.add_row("NEES per degree of freedom", found, "0.8 to 1.3")
     return result
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; `arguments` are those of the command line if None."""
-    parser = argparse.ArgumentParser(description="Coverage, convergence and process noise of the fits.")
-    parser.add_argument("--seeds", type=int, default=50)
-    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
-    options = parser.parse_args(arguments)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("fits", total=None)
-        study = run_study(
-            options.seeds,
-            workers=options.workers,
-            progress=lambda done, total: bar.update(task, completed=done, total=total),
-        )
-    Console(width=None if Console().is_terminal else 140).print(table(study))
+def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
+    """Runs the study and returns its table."""
+    return [table(run_study(options.seeds, jobs=options.jobs, progress=progress))]
 
 
 def _percent(values: Sequence[float]) -> str:
@@ -238,10 +225,6 @@ def _covered(fits: Sequence[Covered]) -> str:
 
 
 def _share(successes: int, trials: int) -> str:
-    """A rate with its 95 % Wilson interval."""
+    """Formats a rate with its 95 % Wilson interval."""
     low, high = wilson(successes, trials)
     return f"{100.0 * successes / trials:.1f} % ({100.0 * low:.1f} to {100.0 * high:.1f})"
-
-
-if __name__ == "__main__":
-    main()

@@ -1,56 +1,66 @@
-"""The same docking trials with an estimator that believes the condensed, the identified, or a wrong planar model.
+"""The same docking trials with an estimator that uses the fitted, the identified or a wrong planar model.
 
-From the checkout, after `auvsim identify LOG... --out model`:
-`python -m auvsim.studies.identified_docking model/parameters.yaml --trials 100 --seed 10`.
-
-Wrong by 20 %: every coefficient of drag, thrust, lift, cross-flow and rudder of the condensed model times 1.2 or 0.8,
-a fair draw for each, anew in each trial; masses and added masses stay.
+Fitted is the planar model fitted to the simulator's own forces. Wrong by 20 % means every coefficient of drag, thrust,
+lift, cross-flow and rudder of the fitted model times 1.2 or 0.8, each drawn with equal chance, anew in each trial;
+masses and added masses stay.
 """
 
-import argparse
 import math
-import multiprocessing
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from rich.console import Console
+import tyro
+from rich.console import RenderableType
 from rich.markup import escape
-from rich.progress import Progress
 from rich.table import Table
 
+from auvsim.analysis.statistics import bootstrap_rms_ratio
 from auvsim.base.randomness import stream
+from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.identification.fit import DEFAULT_FREE, with_values
-from auvsim.missions.docking.metrics import Summary, summarise
 from auvsim.physics import planar_sets
 from auvsim.physics.planar_fit import fit_planar_model
-from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.studies.trials import Summary, docking_trial
 from estimators.planar.model import PlanarParameters
 
-MODELS = ("condensed", "identified", "wrong")
+MODELS = ("fitted", "identified", "wrong")
 WRONG = 0.2
 SHOWN = (  # quantity, phase and unit
     ("position", "all", "m"), ("position", "approach", "m"), ("position", "final", "m"),
     ("velocity", "all", "m/s"), ("current", "all", "m/s"),
 )  # fmt: skip
-VEHICLE, SPEED = "remus100", 1.0  # at which the default trial condenses [m/s]
+VEHICLE, SPEED = "remus100", 1.0  # speed at which the default trial fits its planar model [m/s]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    identified: tyro.conf.Positional[Path]
+    """The identified model: parameters.yaml of `auvsim identify`."""
+    trials: int = 100
+    """Trials with each model."""
+    seed: int = 10
+    """Seed of every random number."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Ratio:
-    """Paired: the rms over all trials with one model by that with another."""
+    """Ratio of rms errors over the same trials with two models."""
 
     value: float
-    low: float  # 95 % interval, by drawing trials again
+    low: float  # of its 95 % bootstrap interval
     high: float
 
 
 def wrong(seed: int, trial: int) -> PlanarParameters:
-    """The condensed model, wrong by 20 %, of one trial."""
+    """Returns the wrong model of one trial: the fitted one with each coefficient 20 % too large or too small."""
     right = fit_planar_model(VEHICLE, SPEED).parameters
     signs = stream(seed, trial, "wrong model").choice([-1.0, 1.0], len(DEFAULT_FREE))
     values = np.array([getattr(right, name) for name in DEFAULT_FREE])
@@ -58,27 +68,26 @@ def wrong(seed: int, trial: int) -> PlanarParameters:
 
 
 def run_one(model: str, identified: Path, seed: int, trial: int) -> Summary:
-    """One trial: the same truth, start and noises whatever is believed.
+    """Runs one trial with the same truth, start and noises whatever model the estimator uses.
 
     Args:
-        model: Of MODELS.
-        identified: The file of the identified one.
-        seed: Of all random streams.
+        model: One of MODELS.
+        identified: File of the identified model.
+        seed: Seed of all random streams.
         trial: Number of the trial under that seed.
     """
     with tempfile.TemporaryDirectory() as folder:
-        believed = planar_sets.CONDENSE
+        assumed = planar_sets.CONDENSE
         if model == "identified":
-            believed = str(identified)
+            assumed = str(identified)
         elif model == "wrong":
-            believed = str(Path(folder) / "wrong.yaml")
-            planar_sets.write(model_set(wrong(seed, trial)), Path(believed))
-        plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": believed}})
-        return summarise(run_trial(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial))
+            assumed = str(Path(folder) / "wrong.yaml")
+            planar_sets.write(model_set(wrong(seed, trial)), Path(assumed))
+        return docking_trial(seed, trial, {"estimator": {"model": assumed}})
 
 
 def model_set(parameters: PlanarParameters) -> planar_sets.PlanarSet:
-    """A file's content of parameters that were not identified."""
+    """Makes the content of a parameter file from parameters that were not identified."""
     return planar_sets.PlanarSet(
         vehicle=VEHICLE, speed=SPEED, method="made up", start="-", version="-", sources=(),
         parameters=planar_sets.coefficients(parameters, {}),
@@ -91,32 +100,30 @@ def run_study(
     seed: int,
     models: Sequence[str] = MODELS,
     *,
-    workers: int | None = None,
-    progress: Callable[[int], None] | None = None,
+    jobs: int | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, tuple[Summary, ...]]:
-    """The summaries of trials 0 .. trials-1 of a seed, by model.
+    """Runs trials 0 .. trials-1 of a seed and returns their summaries by model.
 
     Args:
-        identified: The file of the identified model.
-        trials: How many with each model.
-        seed: Of all of them.
-        models: Of MODELS.
-        workers: Processes; all cores if None.
-        progress: Called with the number of trials done.
+        identified: File of the identified model.
+        trials: Number of trials with each model.
+        seed: Seed of all of them.
+        models: Some of MODELS.
+        jobs: Number of processes; one per core if None.
+        progress: Called with the number of trials done and their total.
     """
-    with ProcessPoolExecutor(workers, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {
-            model: [pool.submit(run_one, model, identified, seed, trial) for trial in range(trials)] for model in models
-        }
-        for done, future in enumerate(as_completed([f for row in futures.values() for f in row]), start=1):
-            future.result()
-            if progress:
-                progress(done)
-        return {model: tuple(future.result() for future in row) for model, row in futures.items()}
+    tasks = [
+        Task(key=(model, n), work=partial(run_one, model, identified, seed, n))
+        for model in models
+        for n in range(trials)
+    ]
+    done = run_tasks(tasks, jobs, progress)
+    return {model: tuple(done[model, n] for n in range(trials)) for model in models}
 
 
 def squares(summaries: Sequence[Summary], quantity: str = "position", phase: str = "all") -> np.ndarray:
-    """Of each trial the number of estimates and the sum of their squared errors of a quantity (n, 2)."""
+    """Returns the number of estimates of each trial and the sum of their squared errors of a quantity (n, 2)."""
     found = [s.estimate.get(phase) for s in summaries]
     values = [getattr(q, f"{quantity}_rms") if q else None for q in found]
     rows = [
@@ -127,33 +134,26 @@ def squares(summaries: Sequence[Summary], quantity: str = "position", phase: str
 
 
 def rms(rows: np.ndarray) -> float:
-    """Over all estimates of trials, which weigh alike."""
+    """Rms over all estimates of all trials, weighted equally."""
     count, total = rows.sum(axis=0)
     return math.sqrt(total / count) if count else math.nan
 
 
-def ratio(
-    ours: Sequence[Summary],
-    theirs: Sequence[Summary],
-    quantity: str = "position",
-    phase: str = "all",
-    draws: int = 2000,
-) -> Ratio:
-    """Ratio of rms errors, with an interval by drawing trials again in pairs (Efron 1979)."""
+def ratio(ours: Sequence[Summary], theirs: Sequence[Summary], quantity: str = "position", phase: str = "all") -> Ratio:
+    """Ratio of rms errors over the trials in which both have estimates, with its bootstrap interval."""
     a, b = squares(ours, quantity, phase), squares(theirs, quantity, phase)
-    generator = np.random.default_rng(0)
-    picks = generator.integers(0, len(a), (draws, len(a)))
-    drawn = [rms(a[pick]) / rms(b[pick]) for pick in picks]
-    low, high = np.percentile(drawn, (2.5, 97.5)).tolist()
+    both = (a[:, 0] > 0) & (b[:, 0] > 0)
+    a, b = a[both], b[both]
+    low, high = bootstrap_rms_ratio(a, b)
     return Ratio(value=rms(a) / rms(b), low=low, high=high)
 
 
 def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
-    """A row of each quantity: its rms with each model, and the identified one's by those of the others."""
+    """Makes a table of the rms of each quantity with each model, and of the identified model relative to the others."""
     count = max(map(len, study.values()), default=0)
     result = Table(title=f"{count} docking trials, seed {seed}, the same for each model")
     others = [model for model in study if model != "identified" and "identified" in study]
-    for heading in ("", *study, *(f"identified by {model}" for model in others)):
+    for heading in ("", *study, *(f"identified relative to {model}" for model in others)):
         result.add_column(heading, justify="right")
     result.add_row("docked", *(str(sum(s.docked for s in summaries)) for summaries in study.values()))
     for quantity, phase, unit in SHOWN:
@@ -166,31 +166,17 @@ def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
 
 
 def _nees(summaries: Sequence[Summary]) -> float:
-    """A degree of freedom, in the mean over all estimates."""
+    """Mean NEES per degree of freedom over all estimates."""
     found = [(q.samples, q.nees_per_dof) for s in summaries if (q := s.estimate["all"]).nees_per_dof is not None]
     return sum(n * value for n, value in found) / sum(n for n, _ in found) if found else math.nan
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; `arguments` are those of the command line if None."""
-    parser = argparse.ArgumentParser(description="The same docking trials with each planar model believed.")
-    parser.add_argument("identified", type=Path, help="parameters.yaml of auvsim identify")
-    parser.add_argument("--trials", type=int, default=100)
-    parser.add_argument("--seed", type=int, default=10)
-    parser.add_argument("--workers", type=int, help="processes; all cores if not given")
-    options = parser.parse_args(arguments)
+def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
+    """Runs the study and returns its table.
+
+    Raises:
+        InputError: If the file of the identified model cannot be used.
+    """
     planar_sets.load(str(options.identified), VEHICLE)
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task("trials", total=options.trials * len(MODELS))
-        study = run_study(
-            options.identified,
-            options.trials,
-            options.seed,
-            workers=options.workers,
-            progress=lambda done: bar.update(task, completed=done),
-        )
-    Console(width=None if Console().is_terminal else 130).print(table(study, options.seed))
-
-
-if __name__ == "__main__":
-    main()
+    study = run_study(options.identified, options.trials, options.seed, jobs=options.jobs, progress=progress)
+    return [table(study, options.seed)]

@@ -1,7 +1,8 @@
-"""Finds models/ (in a checkout or in the installed package) and loads vehicles and docks as PyMJCF elements."""
+"""Finds models/ (in a checkout or in the installed package) and loads vehicles and structures as PyMJCF elements."""
 
+import re
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -10,34 +11,46 @@ from dm_control import mjcf
 
 import auvsim
 from auvsim.base.errors import InputError, unknown_name
-from auvsim.vehicles.allocation import Allocation
+from auvsim.base.frames import Array
+from auvsim.vehicles.actuation import FinsAndShaft
 
 
 @dataclass(frozen=True, kw_only=True)
 class Vehicle:
     """A vehicle's MJCF and what the rest of the system needs to know of it."""
 
-    name: str
+    model: str  # name of the model; an instance in a scene has a name of its own
     root: Any  # PyMJCF RootElement, a fresh one each load
-    allocation: Allocation
-    shaft_limit: float  # largest shaft speed [rad/s]
-    nose: float  # the nose's distance ahead of the body origin [m]
+    source: str  # text of the MJCF file
+    actuation: FinsAndShaft
+    nose: float  # distance of the nose ahead of the body origin [m]
+    length: float  # from the nose to the aftmost body, which is the propeller of a torpedo [m]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Dock:
+class Structure:
     """A funnel dock's MJCF and its dimensions."""
 
-    name: str
+    model: str  # name of the model; an instance in a scene has a name of its own
     root: Any  # PyMJCF RootElement, a fresh one each load
+    source: str  # text of the MJCF file
     mouth_radius: float  # [m]
     throat_radius: float  # [m]
     cone_length: float  # mouth to throat along the axis [m]
+    throat_length: float  # end of the cone to the stop along the axis [m]
     latched: float  # where the latch holds the nose, along the axis from the mouth [m]
+
+    @property
+    def dimensions(self) -> dict[str, float]:
+        """Its dimensions by name [m]."""
+        names = ("mouth_radius", "throat_radius", "cone_length", "throat_length", "latched")
+        return {name: getattr(self, name) for name in names}
 
 
 PACKAGE = Path(auvsim.__file__).parent
-_MARKS = {"vehicle": '<body name="hull"', "dock": '<site name="capture"'}  # what every MJCF of a kind has
+_MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
+INSTANCE = re.compile(r"[A-Za-z_][\w-]{0,63}", re.ASCII)  # what a vehicle or structure may be called
+_MARKS = {"vehicle": '<body name="hull"', "structure": '<site name="capture"'}  # what every MJCF of a kind has
 
 
 def models_folder() -> Path:
@@ -48,56 +61,148 @@ def models_folder() -> Path:
     raise InputError(f"no models folder inside or beside {PACKAGE}; reinstall auvsim")
 
 
-@cache
 def _read(path: Path) -> str:
+    """Text of a file, which is read again when it has changed."""
     try:
-        return path.read_text(encoding="utf-8")
+        state = path.stat()
+        return _text(path, state.st_mtime_ns, state.st_size)
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"model {path}: {error}") from None
 
 
-def _load(kind: str, name: str) -> Any:
-    """The MJCF of a shipped model by name, or of the user's own by the path of its `.xml`."""
+@lru_cache(maxsize=64)
+def _text(path: Path, modified: int, size: int) -> str:
+    return path.read_text(encoding="utf-8")
+
+
+def find(kind: str, name: str) -> Path:
+    """The MJCF file of a shipped model by name, or the user's own by the path of its `.xml`.
+
+    Args:
+        kind: `vehicle` or `structure`.
+        name: of the model, or a path.
+
+    Raises:
+        InputError: no model has that name; the text lists those there are.
+    """
     if name.endswith(".xml"):
-        path = Path(name).expanduser()
-    else:
-        folder = models_folder()
-        path = folder / name / f"{name}.xml"
-        if not path.is_file():
-            known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
-            raise unknown_name(kind, name, known)
+        return Path(name).expanduser()
+    folder = models_folder()
+    path = folder / name / f"{name}.xml"
+    if not path.is_file():
+        known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
+        raise unknown_name(kind, name, known)
+    return path
+
+
+def source(kind: str, name: str) -> tuple[Path, str]:
+    """The MJCF file of a model and its text now; arguments and errors as of `find`."""
+    path = find(kind, name)
+    return path, _read(path)
+
+
+def model_name(kind: str, name: str) -> str:
+    """Name of a model as its MJCF says it, without loading it; arguments and errors as of `find`.
+
+    Raises:
+        InputError: it cannot name a vehicle or structure, too.
+    """
+    path, text = source(kind, name)
+    match = _MODEL.search(text)
+    found = match.group(1) if match else "unnamed"
+    if not INSTANCE.fullmatch(found):
+        shown = found if len(found) <= 40 else f"{found[:37]}..."
+        raise InputError(f"model {path}: model=\"{shown}\": give a name of 1 to 64 letters, digits, '_' and '-'")
+    return found
+
+
+def _parse(path: Path, text: str) -> Any:
     try:
-        return mjcf.from_xml_string(_read(path), model_dir=str(path.parent))
-    except InputError:
-        raise
+        root: Any = mjcf.from_xml_string(text, model_dir=str(path.parent))
     except Exception as error:  # PyMJCF raises whatever its parsers do
         raise InputError(f"model {path}: {' '.join(str(error).split())[:200]}") from None
+    if root.compiler.angle != "radian":
+        raise InputError(
+            f'model {path}: give <compiler angle="radian"/> and every angle in radians; MuJoCo takes them for degrees '
+            "without it"
+        )
+    return root
 
 
 def _numeric(root: Any, where: str, name: str) -> Any:
     element = root.find("numeric", name)
     if element is None:
         raise InputError(f"model {where} lacks the numeric '{name}'")
-    return np.atleast_1d(np.array(element.data, dtype=float))
+    data = np.atleast_1d(np.array([] if element.data is None else element.data, dtype=float))
+    if not data.size or not np.isfinite(data).all():
+        raise InputError(f"model {where}: the numeric '{name}' is {data.tolist()}; its data must be finite numbers")
+    return data
 
 
-def _site_x(root: Any, where: str, name: str) -> float:
+def _allocation(root: Any, where: str, fins: tuple[str, ...]) -> Array:
+    """Fin angle per unit of rudder and of elevator (m, 2)."""
+    columns = []
+    for name in ("allocation_rudder", "allocation_elevator"):
+        column = _numeric(root, where, name)
+        if column.size != len(fins):
+            known = ", ".join(fins) or "none"
+            raise InputError(
+                f"model {where}: '{name}' has {column.size} numbers; it wants {len(fins)}, one for each fin ({known})"
+            )
+        columns.append(column)
+    return np.stack(columns, axis=-1)
+
+
+def _length(root: Any, where: str, name: str) -> float:
+    """A numeric that is a length [m]."""
+    data = _numeric(root, where, name)
+    if data.size != 1 or data[0] <= 0.0:
+        raise InputError(f"model {where}: '{name}' is {data.tolist()}; it must be one number above 0 [m]")
+    return float(data[0])
+
+
+def _site(root: Any, where: str, name: str) -> Array:
+    """Place (3,) of a site in its body [m]."""
     site = root.find("site", name)
     if site is None:
         raise InputError(f"model {where} lacks the site '{name}'")
-    return float(site.pos[0])
+    place = np.zeros(3) if site.pos is None else np.array(site.pos, dtype=float)
+    if not np.isfinite(place).all():
+        raise InputError(f"model {where}: the site '{name}' is at {place.tolist()}; give finite numbers")
+    return place
 
 
-def _limit(root: Any, where: str, name: str) -> float:
+def _site_x(root: Any, where: str, name: str) -> float:
+    return float(_site(root, where, name)[0])
+
+
+def _attribute(element: Any, name: str) -> Any:
+    """An attribute of an MJCF element: its own, else that of its default classes from the inside out, else None."""
+    value, group = getattr(element, name), element.dclass or element.root.default
+    while value is None and group is not None and group.tag == "default":
+        value, group = getattr(getattr(group, element.tag), name, None), group.parent
+    return value
+
+
+def _limits(root: Any, where: str, name: str) -> Array:
+    """Smallest and largest command (2,) of an actuator."""
     actuator = root.find("actuator", name)
     if actuator is None:
         raise InputError(f"model {where} lacks the actuator '{name}'")
-    limits = actuator.ctrlrange
-    if limits is None and actuator.dclass is not None:
-        limits = getattr(actuator.dclass, actuator.tag).ctrlrange
+    limits = _attribute(actuator, "ctrlrange")
     if limits is None:
         raise InputError(f"model {where}: actuator '{name}' needs a ctrlrange")
-    return float(np.min(np.abs(limits)))
+    return np.array(limits, dtype=float)
+
+
+def _lag(root: Any, name: str) -> float:
+    """Time constant [s] of a servo: damping / kp of a position servo, armature / kv of a velocity servo."""
+    actuator = root.find("actuator", name)
+    terms = {"position": ("damping", "kp"), "velocity": ("armature", "kv")}.get(actuator.tag)
+    if terms is None:
+        return 0.0
+    inertia, gain = _attribute(actuator.joint, terms[0]), _attribute(actuator, terms[1])
+    return float(np.atleast_1d(inertia)[0] / gain) if inertia is not None and gain else 0.0
 
 
 def vehicle(name: str) -> Vehicle:
@@ -106,34 +211,46 @@ def vehicle(name: str) -> Vehicle:
     Raises:
         InputError: there is no such model, or it breaks the contract; the text says where.
     """
-    root = _load("vehicle", name)
-    if root.find("body", "hull") is None:
+    path, text = source("vehicle", name)
+    root = _parse(path, text)
+    hull = root.find("body", "hull")
+    if hull is None:
         raise InputError(f"model {name} lacks the body 'hull'")
+    if root.find("actuator", "shaft") is None:
+        known = ", ".join(str(a.name) for a in root.find_all("actuator")) or "none"
+        raise InputError(f"model {name} lacks the actuator 'shaft', that of its propeller; there are {known}")
     fins = tuple(a.name for a in root.find_all("actuator") if a.name != "shaft")
-    matrix = np.stack([_numeric(root, name, f"allocation_{axis}") for axis in ("rudder", "elevator")], axis=-1)
-    limit = min((_limit(root, name, fin) for fin in fins), default=0.0)
-    return Vehicle(
-        name=root.model,
-        root=root,
-        allocation=Allocation(names=fins, matrix=matrix, limit=limit),
-        shaft_limit=_limit(root, name, "shaft"),
-        nose=_site_x(root, name, "nose"),
-    )
+    matrix = _allocation(root, name, fins)
+    limits = np.stack([_limits(root, name, channel) for channel in (*fins, "shaft")])
+    lags = np.array([_lag(root, channel) for channel in (*fins, "shaft")])
+    nose = _site_x(root, name, "nose")
+    aftmost = min((float(body.pos[0]) for body in hull.body if body.pos is not None), default=-nose)
+    try:
+        actuation = FinsAndShaft(fins=fins, matrix=matrix, limits=limits, lags=lags)
+    except InputError as error:
+        raise InputError(f"model {name}: {error}") from None
+    return Vehicle(model=root.model, root=root, source=text, actuation=actuation, nose=nose, length=nose - aftmost)
 
 
-def dock(name: str) -> Dock:
-    """Loads a dock: `dock`, or the path of an MJCF file that keeps the contract of models/README.md.
+def structure(name: str) -> Structure:
+    """Loads a structure: `dock`, or the path of an MJCF file that keeps the contract of models/README.md.
 
     Raises:
         InputError: there is no such model, or it breaks the contract; the text says where.
     """
-    root = _load("dock", name)
-    _site_x(root, name, "capture")
-    return Dock(
-        name=root.model,
-        root=root,
-        mouth_radius=float(_numeric(root, name, "mouth_radius")[0]),
-        throat_radius=float(_numeric(root, name, "throat_radius")[0]),
-        cone_length=float(_numeric(root, name, "cone_length")[0]),
-        latched=_site_x(root, name, "latched"),
-    )
+    path, text = source("structure", name)
+    root = _parse(path, text)
+    _site(root, name, "capture")
+    if np.abs(_site(root, name, "mouth")).max() > 1e-6:
+        raise InputError(f"model {name}: the site 'mouth' must be the origin, for a dock's place is that of its mouth")
+    dimensions = ("mouth_radius", "throat_radius", "cone_length", "throat_length")
+    lengths = {dimension: _length(root, name, dimension) for dimension in dimensions}
+    latched, (mouth, throat, cone, rest) = _site_x(root, name, "latched"), lengths.values()
+    if throat > mouth:
+        raise InputError(f"model {name}: throat_radius {throat:g} m is more than mouth_radius {mouth:g} m")
+    if not 0.0 < latched < cone + rest:
+        raise InputError(
+            f"model {name}: the site 'latched' is {latched:g} m behind the mouth; it must be between 0 and the stop at "
+            f"{cone + rest:g} m"
+        )
+    return Structure(model=root.model, root=root, source=text, latched=latched, **lengths)

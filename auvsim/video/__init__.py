@@ -1,7 +1,7 @@
-"""The video of a trial and a still picture, from its log alone, drawn without a window.
+"""The video of a run and a still picture, from its log alone, drawn without a window.
 
-Main view: from above where the trial is time-lapse, the dock where it is slow. Beside it the vehicle from behind and
-from above, the numbers of the moment and a legend.
+Main view: from above where the run is time-lapse, a dock where it is slow. Beside it the vehicle from behind and from
+above, or several vehicles from behind; the numbers of the moment and a legend.
 """
 
 import os
@@ -18,11 +18,12 @@ import numpy as np
 
 from auvsim.base.errors import DrawingError, InputError
 from auvsim.base.files import whole
-from auvsim.data.log import TrialLog
+from auvsim.data.log import Log
 from auvsim.video.canvas import Picture
+from auvsim.video.motion import Motion
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage
-from auvsim.video.storyboard import NEAR, Frame, storyboard, verdict
+from auvsim.video.storyboard import Frame, looked_at, storyboard, verdict
 
 __all__ = ["DrawingError", "render", "still"]
 
@@ -33,7 +34,7 @@ WAITING = 8  # pictures drawn ahead of the encoder
 
 
 def render(
-    log: TrialLog,
+    log: Log,
     path: str | os.PathLike[str],
     *,
     width: int = 1280,
@@ -43,7 +44,7 @@ def render(
     cameras: Sequence[str] = (),
     progress: Callable[[int, int], None] | None = None,
 ) -> None:
-    """Writes the video of a trial (MP4, H.264), whole or not at all.
+    """Writes the video of a run (MP4, H.264), whole or not at all.
 
     Args:
         log: of any status.
@@ -52,8 +53,9 @@ def render(
         height: even [pixels].
         fps: pictures a second.
         speed: speed-up far from the dock; by default such that the video lasts less than a minute.
-        cameras: up to three of overview, follow, above, dock: the main view and those beside it, throughout; by
-            default overview or dock, with follow and above beside them.
+        cameras: up to four of overview, follow, above, dock: the main view and those beside it, throughout; the
+            latter three also of one vehicle or dock by its name, as in `follow:auv_2`. By default overview or dock,
+            with follow and above of a lone vehicle, or follow of the first three, beside them.
         progress: called with the number of pictures done and in all.
 
     Raises:
@@ -76,7 +78,7 @@ def render(
 
 
 def still(
-    log: TrialLog,
+    log: Log,
     path: str | os.PathLike[str],
     time: float | None = None,
     *,
@@ -84,12 +86,13 @@ def still(
     height: int = 720,
     cameras: Sequence[str] = (),
 ) -> None:
-    """Writes one picture of a trial (PNG), with smooth edges, whole or not at all.
+    """Writes one picture of a run (PNG), with smooth edges, whole or not at all.
 
     Args:
         log: of any status.
         path: of the picture.
-        time: of the trial [s]; by default just before the nose comes nearest to the dock's mouth.
+        time: of the run [s]; by default just before the first vehicle with a dock comes nearest to its mouth,
+            or else the end.
         width: [pixels].
         height: [pixels].
         cameras: as for `render`.
@@ -99,16 +102,23 @@ def still(
         InputError: the log holds nothing to draw, there is no such camera, or the file cannot be written.
     """
     playback = Playback(log)
+    docking = next((motion for motion in playback.motions.values() if np.isfinite(motion.ranges).any()), None)
     if time is None:
-        nearest = int(playback.ranges.argmin())
-        time = float(playback.times[np.flatnonzero(playback.ranges[: nearest + 1] >= JUST_BEFORE).max(initial=0)])
-    near = playback.at(time).range < NEAR
-    frame = Frame(time=time, speed=0.0, near=near, banner=verdict(playback) if time >= playback.end else "")
+        time = _just_before(docking) if docking else playback.end
+    focus = looked_at(playback, time)
+    banner = verdict(playback) if time >= playback.end else ""
+    frame = Frame(time=time, speed=0.0, near=focus is not None, banner=banner, focus=focus)
     try:
         with Stage(playback, width, height, cameras, samples=4) as stage, whole(Path(path)) as partial:
             _save_png(stage.picture(frame, 0.0), partial)
     except OSError as error:
         raise InputError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _just_before(motion: Motion) -> float:
+    """When a vehicle's nose was still a little away from its dock, before it came nearest [s]."""
+    nearest = int(motion.ranges.argmin())
+    return float(motion.times[np.flatnonzero(motion.ranges[: nearest + 1] >= JUST_BEFORE).max(initial=0)])
 
 
 def _save_png(picture: Picture, path: Path) -> None:

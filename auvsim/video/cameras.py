@@ -1,4 +1,7 @@
-"""Where the scene is looked at from: the whole trial, the vehicle from behind and from above, the dock from aside."""
+"""Where the scene is looked at from: the whole run, a vehicle from behind and from above, a dock from aside.
+
+A view is of the vehicle in focus and its dock, or of one by its name: `follow:auv_2`, `dock:west`.
+"""
 
 import math
 from collections.abc import Callable
@@ -6,10 +9,11 @@ from collections.abc import Callable
 import mujoco
 import numpy as np
 
-from auvsim.base.errors import unknown_name
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.frames import Array
 from auvsim.video.canvas import Box
-from auvsim.video.playback import Moment, Playback
+from auvsim.video.motion import VehicleMoment
+from auvsim.video.playback import Dock, Moment, Playback
 
 FIELD = 45.0  # vertical field of view [deg]
 TILT = -50.0  # of the overview [deg]
@@ -21,63 +25,103 @@ class Cameras:
     """The cameras of one video; they remember where they looked, so that they turn smoothly.
 
     Args:
-        playback: the trial.
+        playback: the run.
         aspect: width over height of the overview.
     """
 
     def __init__(self, playback: Playback, aspect: float) -> None:
         playback.model.vis.global_.fovy = FIELD
         self._playback = playback
-        self._axis_azimuth = -math.degrees(playback.pose.heading)
-        self._azimuth: float | None = None
+        self._azimuths: dict[str, float] = {}  # of the view from behind, by vehicle
         self._tangents = MARGIN * math.tan(math.radians(FIELD / 2.0)) * np.array([aspect, 1.0])
         self._overview = _overview(playback, self._tangents)
         self.overview_distance = float(self._overview.distance)
-        self._aims: dict[str, Callable[[Moment, float], mujoco.MjvCamera]] = {
-            "overview": lambda moment, step: self._overview,
+        self._aims: dict[str, Callable[[str, Moment, float], mujoco.MjvCamera]] = {
+            "overview": lambda subject, moment, step: self._overview,
             "follow": self._follow,
             "above": self._above,
             "dock": self._dock,
         }
 
-    def check(self, name: str) -> None:
-        """Raises InputError unless there is a camera of that name."""
-        if name not in self._aims:
-            raise unknown_name("camera", name, list(self._aims))
+    def check(self, view: str) -> None:
+        """Raises InputError unless there is such a view of something that the log has."""
+        kind, subject = split(view)
+        if kind not in self._aims:
+            raise unknown_name("camera", view, list(self._aims))
+        known = list(self._playback.docks if kind == "dock" else self._playback.motions)
+        if kind == "dock" and not known:
+            raise InputError(f"camera '{view}': the log has no dock; there are overview, follow, above")
+        if subject and (kind == "overview" or subject not in known):
+            raise InputError(
+                f"camera '{view}': {kind} may be of {'all only' if kind == 'overview' else ', '.join(known)}"
+            )
 
-    def aim(self, name: str, moment: Moment, step: float) -> mujoco.MjvCamera:
+    def aim(self, view: str, moment: Moment, step: float) -> mujoco.MjvCamera:
         """A camera at a moment.
 
         Args:
-            name: one of overview, follow, above, dock.
+            view: overview, follow, above or dock, the latter three also with `:` and a name.
             moment: what it looks at.
             step: time in the video since it was aimed before [s].
         """
-        return self._aims[name](moment, step)
+        kind, subject = split(view)
+        return self._aims[kind](subject, moment, step)
 
-    def _follow(self, moment: Moment, step: float) -> mujoco.MjvCamera:
+    def looked_at(self, view: str, moment: Moment) -> str:
+        """The vehicle that a view shows: the one named, the one nearest to the dock named, or else the one in focus."""
+        kind, subject = split(view)
+        if not subject:
+            return moment.focus
+        if kind != "dock":
+            return subject
+        mouth = self._playback.docks[subject].mouth
+        return min(moment.vehicles, key=lambda name: math.dist(moment.vehicles[name].nose, mouth))
+
+    def _follow(self, subject: str, moment: Moment, step: float) -> mujoco.MjvCamera:
         """From behind and above."""
-        wanted = -math.degrees(moment.heading)
-        if self._azimuth is None:
-            self._azimuth = wanted
-        self._azimuth += (wanted - self._azimuth) * (1.0 - math.exp(-step / SETTLING))
-        return _camera(moment.position + np.array([0.0, 0.0, 0.15]), 4.2, self._azimuth + 14.0, -17.0)
+        name = subject or moment.focus
+        now = moment.vehicles[name]
+        wanted = -math.degrees(now.heading)
+        azimuth = self._azimuths.get(name, wanted)
+        azimuth += (wanted - azimuth) * (1.0 - math.exp(-step / SETTLING))
+        self._azimuths[name] = azimuth
+        return _camera(now.position + np.array([0.0, 0.0, 0.15]), 4.2, azimuth + 14.0, -17.0)
 
-    def _above(self, moment: Moment, step: float) -> mujoco.MjvCamera:
-        """From straight above, the dock's axis upwards, from so high that the estimate is in the picture too."""
+    def _above(self, subject: str, moment: Moment, step: float) -> mujoco.MjvCamera:
+        """From straight above, its dock's axis or north upwards, so high that the estimate is in the picture too."""
+        name = subject or moment.focus
+        now, dock = moment.vehicles[name], self._playback.dock_of(name)
         spread = 0.0
-        if moment.belief is not None:
-            spread = float(np.linalg.norm((moment.belief.position - moment.position)[:2]))
-        return _camera(moment.position, 8.0 + min(3.0 * spread, 30.0), self._axis_azimuth, -89.5)
+        if now.belief is not None:
+            spread = float(np.linalg.norm((now.belief.position - now.position)[:2]))
+        azimuth = -math.degrees(dock.heading) if dock else 0.0
+        return _camera(now.position, 8.0 + min(3.0 * spread, 30.0), azimuth, -89.5)
 
-    def _dock(self, moment: Moment, step: float) -> mujoco.MjvCamera:
+    def dock_in(self, view: str, moment: Moment) -> Dock:
+        """The dock that a view of one shows: the one named, that of the vehicle in focus, or else the first."""
+        _, subject = split(view)
+        docks = self._playback.docks
+        return docks[subject] if subject else self._playback.dock_of(moment.focus) or next(iter(docks.values()))
+
+    def _dock(self, subject: str, moment: Moment, step: float) -> mujoco.MjvCamera:
         """Obliquely from the dock's starboard side, nose and mouth in the picture."""
-        mouth = self._playback.mouth
-        away = moment.position - mouth
-        away *= min(1.0, 30.0 / max(float(np.linalg.norm(away)), 1e-9))
-        dock = mouth + np.array([[0.0, 0.0, 1.1], [0.0, 0.0, -1.6], 1.7 * self._playback.axis])
-        vehicle = mouth + away + np.outer((-1.0, 1.0), moment.nose - moment.position)
-        return _fitted(np.concatenate([dock, vehicle]), self._axis_azimuth + 58.0, -20.0, self._tangents)
+        view = f"dock:{subject}"
+        dock, now = self.dock_in(view, moment), moment.vehicles[self.looked_at(view, moment)]
+        return _fitted(_dock_and_nose(dock, now), -math.degrees(dock.heading) + 58.0, -20.0, self._tangents)
+
+
+def split(view: str) -> tuple[str, str]:
+    """Kind of a view, and the name of what it is of; "" for what is in focus."""
+    kind, _, subject = view.partition(":")
+    return kind, subject
+
+
+def _dock_and_nose(dock: Dock, now: VehicleMoment) -> Array:
+    """Points (n, 3) of a dock and of a vehicle, which is taken for nearer where it is far."""
+    away = now.position - dock.mouth
+    away *= min(1.0, 30.0 / max(float(np.linalg.norm(away)), 1e-9))
+    funnel = dock.mouth + np.array([[0.0, 0.0, 1.1], [0.0, 0.0, -1.6], 1.7 * dock.axis])
+    return np.concatenate([funnel, dock.mouth + away + np.outer((-1.0, 1.0), now.nose - now.position)])
 
 
 def _camera(target: Array, distance: float, azimuth: float, elevation: float) -> mujoco.MjvCamera:
@@ -87,9 +131,11 @@ def _camera(target: Array, distance: float, azimuth: float, elevation: float) ->
 
 
 def _overview(playback: Playback, tangents: Array) -> mujoco.MjvCamera:
-    """The camera from which the whole track and the dock fill the picture best, of all azimuths."""
-    around = playback.mouth + 15.0 * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
-    points = np.concatenate([playback.positions, around])
+    """The camera from which all tracks and docks fill the picture best, of all azimuths."""
+    around = 15.0 * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
+    tracks = [motion.positions for motion in playback.motions.values()]
+    places = [dock.mouth for dock in playback.docks.values()] or [track[0] for track in tracks]
+    points = np.concatenate([*tracks, *(place + around for place in places)])
     # Of nearly equal ones the one in which north points most upwards: azimuth 0 looks north.
     fits = [_fitted(points, azimuth, TILT, tangents) for azimuth in range(-180, 180, 15)]
     return min(fits, key=lambda camera: camera.distance * (1.0 + 0.0005 * abs(camera.azimuth)))

@@ -8,7 +8,7 @@ import numpy as np
 
 from auvsim.base.frames import Array
 from auvsim.physics import scenery
-from auvsim.video.playback import Moment, Playback
+from auvsim.video.playback import Playback
 
 Colour = tuple[float, float, float, float]
 
@@ -16,7 +16,7 @@ LINE, ARROW = mujoco.mjtGeom.mjGEOM_LINE, mujoco.mjtGeom.mjGEOM_ARROW
 BALL, DOT = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_BOX
 
 FLOOR: Colour = (0.32, 0.62, 0.72, 1.0)  # in the overview
-MOMENTARY = 350  # room for marks of the moment
+MOMENTARY, OF_EACH = 340, 10  # room for marks of the moment, and of each vehicle
 _UPRIGHT = np.eye(3).ravel()
 _NOTHING = np.zeros(3)
 
@@ -47,7 +47,8 @@ class Layer:
         self._marks = sorted(marks, key=lambda mark: mark.time)
         self._times = np.array([mark.time for mark in self._marks])
         self._places = np.array([mark.end for mark in self._marks]).reshape(-1, 3)
-        self.scene = mujoco.MjvScene(playback.model, maxgeom=playback.model.ngeom + len(marks) + MOMENTARY)
+        geoms = playback.model.ngeom + len(marks) + MOMENTARY + OF_EACH * len(playback.motions)
+        self.scene = mujoco.MjvScene(playback.model, maxgeom=geoms)
         self._geoms = self.scene.geoms
         for flag in (mujoco.mjtRndFlag.mjRND_SHADOW, mujoco.mjtRndFlag.mjRND_REFLECTION):
             self.scene.flags[flag] = 0
@@ -65,14 +66,19 @@ class Layer:
         """Whether the horizon may be in the picture; to draw what is then hidden would cost a third of the time."""
         self.scene.flags[mujoco.mjtRndFlag.mjRND_SKYBOX] = self.scene.flags[mujoco.mjtRndFlag.mjRND_HAZE] = int(seen)
 
-    def begin(self, moment: Moment) -> None:
-        """Starts a moment: bodies where the model has them, and the marks up to now that the water does not hide."""
-        count = int(np.searchsorted(self._times, moment.time, side="right"))
+    def begin(self, time: float, position: Array) -> None:
+        """Starts a moment: bodies where the model has them, and the marks up to now that the water does not hide.
+
+        Args:
+            time: [s].
+            position: (3,) round which it is looked [m].
+        """
+        count = int(np.searchsorted(self._times, time, side="right"))
         if self._overview:
             kept, self.scene.ngeom = range(count), 1
         else:
             self._bodies()
-            away = np.linalg.norm(self._places[:count] - moment.position, axis=1)
+            away = np.linalg.norm(self._places[:count] - position, axis=1)
             kept = np.flatnonzero(away < scenery.MURK[1]).tolist()
         for index in kept:
             _, kind, width, start, end, colour = self._marks[index]

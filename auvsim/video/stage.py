@@ -5,19 +5,14 @@ from collections.abc import Sequence
 import mujoco
 
 from auvsim.base.errors import InputError
-from auvsim.video import overlay
-from auvsim.video.cameras import Cameras, project
+from auvsim.video import marks, overlay, panel
+from auvsim.video.cameras import Cameras, project, split
 from auvsim.video.canvas import Box, Canvas, Picture
-from auvsim.video.marks import DOCK, TRUE, FarMarks, NearMarks
+from auvsim.video.marks import FarMarks, NearMarks
 from auvsim.video.playback import Moment, Playback
 from auvsim.video.storyboard import Frame
 
-NAMES = {
-    "overview": "overview, squares of 50 m",
-    "follow": "vehicle",
-    "above": "from above, dock axis up",
-    "dock": "dock",
-}
+MOST = 4  # views of a picture
 SIDE, READABLE = 0.325, 290  # part of the width that the views beside the main one take; least width for text
 
 
@@ -25,10 +20,10 @@ class Stage:
     """Draws the pictures of one video; use it in a `with` statement.
 
     Args:
-        playback: the trial.
+        playback: the run.
         width: of the picture [pixels].
         height: of the picture [pixels].
-        cameras: names of the main view and those beside it; none for the default.
+        cameras: the main view and those beside it, see `Cameras`; none for the default.
         samples: for smooth edges.
 
     Raises:
@@ -39,10 +34,10 @@ class Stage:
     def __init__(
         self, playback: Playback, width: int, height: int, cameras: Sequence[str] = (), samples: int = 0
     ) -> None:
-        if len(cameras) > 3:
-            raise InputError(f"video: {len(cameras)} cameras: at most three fit into the picture")
-        self._playback, self._names = playback, tuple(cameras)
-        self._boxes = layout(width, height, len(cameras) or 3)
+        if len(cameras) > MOST:
+            raise InputError(f"video: {len(cameras)} cameras: at most {MOST} fit into the picture")
+        self._playback, self._views = playback, tuple(cameras)
+        self._boxes = layout(width, height, len(cameras) or 1 + len(beside(playback)))
         self._cameras = Cameras(playback, self._boxes[0].width / self._boxes[0].height)
         for name in cameras:
             self._cameras.check(name)
@@ -51,7 +46,7 @@ class Stage:
             width - side if len(self._boxes) > 1 else 0,
             0,
             side,
-            round(side * overlay.PANEL_HEIGHT / overlay.PANEL_WIDTH),
+            round(side * panel.HEIGHT / panel.WIDTH),
         )
         playback.pose_model(playback.at(playback.start))
         self._near = NearMarks(playback)
@@ -71,54 +66,74 @@ class Stage:
             frame: what to show.
             step: time in the video since the frame before [s].
         """
-        playback = self._playback
-        moment = playback.at(frame.time)
-        playback.pose_model(moment)
-        names = self._names or ("dock" if frame.near else "overview", "follow", "above")
-        if "overview" in names:
-            self._far.update(moment, frame.speed)
-        if set(names) - {"overview"}:
-            self._near.update(moment, frame.speed)
-        places: dict[str, tuple[int, int] | None] = {}
-        for name, box in zip(names, self._boxes, strict=True):
-            self._view(name, box, moment, step, places)
+        moment = self._playback.at(frame.time, frame.focus)
+        self._playback.pose_model(moment)
+        views = self._views or ("dock" if frame.near else "overview", *beside(self._playback))
+        if "overview" in views:
+            self._far.update(moment)
+        drawn = ""  # vehicle round which the marks of the near views are
+        for view, box in zip(views, self._boxes, strict=True):
+            if view != "overview" and (vehicle := self._cameras.looked_at(view, moment)) != drawn:
+                self._near.update(moment, vehicle, frame.speed)
+                drawn = vehicle
+            self._view(view, box, moment, step)
         picture = self._canvas.read()
-        self._write(picture, names, moment, frame, places)
+        self._write(picture, views, moment, frame)
         return picture
 
-    def _view(
-        self, name: str, box: Box, moment: Moment, step: float, places: dict[str, tuple[int, int] | None]
-    ) -> None:
-        """Draws one view and notes where in it the vehicle and the dock are."""
-        camera = self._cameras.aim(name, moment, step)
-        marks = self._far if name == "overview" else self._near
-        mujoco.mjv_updateCamera(self._playback.model, self._playback.data, camera, marks.layer.scene)
-        marks.layer.sky(name in ("follow", "dock"))
-        self._canvas.draw(marks.layer.scene, box)
-        if name == "overview":
-            places["AUV"] = project(marks.layer.scene, moment.position + self._far.above, box)
-            places["dock"] = project(marks.layer.scene, self._playback.mouth + self._far.above, box)
+    def _view(self, view: str, box: Box, moment: Moment, step: float) -> None:
+        camera = self._cameras.aim(view, moment, step)
+        layer = (self._far if view == "overview" else self._near).layer
+        mujoco.mjv_updateCamera(self._playback.model, self._playback.data, camera, layer.scene)
+        layer.sky(split(view)[0] in ("follow", "dock"))
+        self._canvas.draw(layer.scene, box)
 
-    def _write(
-        self,
-        picture: Picture,
-        names: Sequence[str],
-        moment: Moment,
-        frame: Frame,
-        places: dict[str, tuple[int, int] | None],
-    ) -> None:
+    def _write(self, picture: Picture, views: Sequence[str], moment: Moment, frame: Frame) -> None:
         scale = picture.shape[0] / 720.0
-        for text, colour in (("AUV", TRUE), ("dock", DOCK)):
-            overlay.label(picture, text, places.get(text), overlay.rgb(colour), scale)
-        for name, box in zip(names, self._boxes, strict=True):
-            overlay.tag(picture, NAMES[name], box, scale)
+        if "overview" in views:
+            self._label(picture, moment, self._boxes[views.index("overview")], scale)
+        for view, box in zip(views, self._boxes, strict=True):
+            overlay.tag(picture, self._name(view, moment), box, scale)
         for box in self._boxes[1:]:
             overlay.fill(picture, Box(box.x, box.y, box.width, max(round(2 * scale), 1)), overlay.PANEL)
-        overlay.panel(picture, self._playback, moment, frame.speed, self._corner, solid=len(names) > 1)
+        panel.panel(picture, self._playback, moment, frame.speed, self._corner, solid=len(views) > 1)
         if frame.banner:
             main = self._boxes[0]
-            left = self._corner.width if len(names) == 1 else 0
+            left = self._corner.width if len(views) == 1 else 0
             overlay.banner(picture, frame.banner, Box(main.x + left, main.y, main.width - left, main.height), scale)
+
+    def _label(self, picture: Picture, moment: Moment, box: Box, scale: float) -> None:
+        """Names of vehicles and docks in the overview."""
+        playback, scene, above = self._playback, self._far.layer.scene, self._far.above
+        for name, now in moment.vehicles.items():
+            place = project(scene, now.position + above, box)
+            colour = overlay.rgb(marks.colour_of(playback, name))
+            overlay.label(picture, "AUV" if playback.lone else name, place, colour, scale)
+        for name, dock in playback.docks.items():
+            text = "dock" if len(playback.docks) == 1 else name
+            place = dock.mouth + above if playback.lone else dock.mouth - 1.3 * above  # clear of a vehicle in it
+            overlay.label(picture, text, project(scene, place, box), overlay.rgb(marks.DOCK), scale)
+
+    def _name(self, view: str, moment: Moment) -> str:
+        """What stands in the corner of a view."""
+        kind, _ = split(view)
+        if kind == "overview":
+            return "overview, squares of 50 m"
+        if kind == "dock":
+            return "dock" if len(self._playback.docks) == 1 else f"dock {self._cameras.dock_in(view, moment).name}"
+        vehicle = self._cameras.looked_at(view, moment)
+        who = "" if self._playback.lone else vehicle
+        if kind == "follow":
+            return who or "vehicle"
+        up = "dock axis up" if self._playback.dock_of(vehicle) else "north up"
+        return f"{who} from above, {up}".lstrip()
+
+
+def beside(playback: Playback) -> tuple[str, ...]:
+    """The views beside the main one: of a lone vehicle two, of several the first ones from behind."""
+    if playback.lone:
+        return "follow", "above"
+    return tuple(f"follow:{name}" for name in [*playback.motions][: MOST - 1])
 
 
 def side_width(width: int) -> int:
@@ -131,7 +146,7 @@ def layout(width: int, height: int, views: int) -> list[Box]:
     if views == 1:
         return [Box(0, 0, width, height)]
     side = side_width(width)
-    top = round(side * overlay.PANEL_HEIGHT / overlay.PANEL_WIDTH)
+    top = round(side * panel.HEIGHT / panel.WIDTH)
     each = (height - top) // (views - 1)
     boxes = [Box(0, 0, width - side, height)]
     for index in range(views - 1):

@@ -5,7 +5,7 @@ D22 = E[Q^-1] + E[H' R^-1 H], expectations over sampled truths. It is a filter l
 bound of delayed, lost or shuffled measurements is that of what had arrived.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,7 +14,17 @@ from estimators.core import loops
 from estimators.core.ekf import Innovation
 from estimators.core.errors import NotPositiveDefiniteError
 from estimators.core.history import Input, Node
-from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
+from estimators.core.types import (
+    NO_MODEL,
+    Array,
+    Gaussian,
+    Measurement,
+    Models,
+    ProcessModel,
+    Verdict,
+    Verdicts,
+    model_of,
+)
 
 Truths = Callable[[float], Array]  # time [s] -> true states (k, n), one of each sampled trajectory
 
@@ -27,6 +37,7 @@ class BoundState(NamedTuple):
     mean: Array  # (n,) of the truths
     outliers: int = 0
     innovation: Innovation | None = None
+    verdicts: Verdicts = ()
 
     @property
     def belief(self) -> Gaussian:
@@ -37,21 +48,21 @@ class BoundState(NamedTuple):
 class PosteriorBound:
     """The posterior Cramér-Rao bound along sampled truths, for a `History`.
 
-    With one trajectory it is the bound given that way, which is that of an extended Kalman filter linearised at the
+    With one trajectory it is the bound conditional on it, which is that of an extended Kalman filter linearised at the
     truth; the more the trajectories differ, the lower (the less sharp) it lies.
 
     Args:
-        process: How states move on; its noise must reach all states.
-        models: What the measurements of each kind show; kinds not named are ignored.
+        process: Process model; its noise must reach all states.
+        models: Measurement model of each kind; kinds not named are ignored.
         truths: True states at a time.
         first: (nodes, index) -> the covariance (n, n) at the node at which an estimator starts, or None.
-        noise: What a `DockingEstimator` is to believe of its compass, a `DockingNoise`.
+        noise: Compass noise that a `DockingEstimator` is to assume, a `DockingNoise`.
     """
 
     def __init__(
         self,
         process: ProcessModel,
-        models: Mapping[str, MeasurementModel],
+        models: Models,
         truths: Truths,
         first: Callable[[Sequence[Node], int], Array | None],
         noise: Any = None,
@@ -64,8 +75,8 @@ class PosteriorBound:
         covariance = self._first(nodes, index)
         if covariance is None:
             return None
-        time = nodes[index].time
-        return BoundState(time, inverse(covariance), self._truths(time).mean(axis=0))
+        time, verdicts = nodes[index].time, tuple(map(Verdict, nodes[index].measurements))
+        return BoundState(time, inverse(covariance), self._truths(time).mean(axis=0), verdicts=verdicts)
 
     def predict(self, state: BoundState, u: Input, duration: float) -> BoundState:
         """The bound after `duration` [s].
@@ -89,12 +100,14 @@ class PosteriorBound:
     def correct(self, state: BoundState, node_time: float, measurements: Sequence[Measurement]) -> BoundState:
         """The bound with the information of a node's measurements."""
         information = state.information.copy()
+        verdicts = []
         for measurement in measurements:
-            if (model := self._models.get(measurement.kind)) is not None:
+            if (model := model_of(self._models, measurement)) is not None:
                 for x in (truths := self._truths(node_time)):
-                    H, R = model.jacobian(x), model.covariance(x, measurement)
+                    H, R = model.jacobian(x, measurement), model.covariance(x, measurement)
                     information += H.T @ np.linalg.solve(R, H) / len(truths)
-        return BoundState(node_time, information, state.mean)
+            verdicts.append(Verdict(measurement, "" if model is not None else NO_MODEL))
+        return BoundState(node_time, information, state.mean, verdicts=tuple(verdicts))
 
 
 def inverse(matrix: Array) -> Array:

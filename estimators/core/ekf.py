@@ -14,7 +14,7 @@ from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Innovation:
-    """What a measurement said that the belief did not."""
+    """Innovation of a measurement, with its covariance and gain."""
 
     residual: Array  # (m,)
     covariance: Array  # (m, m) of the residual, S = H P H' + R
@@ -26,22 +26,11 @@ class Innovation:
 def predict(belief: Gaussian, process: ProcessModel, u: Sequence[float], dt: float) -> Gaussian:
     """The belief after `dt` [s] with the input `u` held: f(x), F P F' + Q.
 
-    A process with a `propagate(mean, covariance, u, dt) -> (mean, covariance, ...)` of its own is predicted with that.
-
     Raises:
         NotFiniteError: The prediction is not finite.
     """
-    propagate = getattr(process, "propagate", None)
-    if propagate is not None:
-        mean, covariance, *_ = propagate(belief.mean, belief.covariance, u, dt)
-        return Gaussian(mean=mean, covariance=covariance)
-    x = belief.mean
-    F = process.jacobian(x, u, dt)
-    P = F @ belief.covariance @ F.T + process.covariance(x, u, dt)
-    mean = process.evaluate(x, u, dt)
-    if not (np.isfinite(mean).all() and np.isfinite(P).all()):
-        raise NotFiniteError(f"prediction over {dt:g} s from {x} with input {u} is not finite")
-    return Gaussian(mean=mean, covariance=0.5 * (P + P.T))
+    mean, covariance, _ = process.propagate(belief.mean, belief.covariance, u, dt)
+    return Gaussian(mean=mean, covariance=covariance)
 
 
 def correct(
@@ -52,7 +41,7 @@ def correct(
     Args:
         belief: State before the measurement.
         measurement: Value (m,) and covariance (m, m).
-        model: What the sensor shows of the state.
+        model: Measurement model of the sensor.
         gate: Probability with which a measurement that fits the models is accepted, 0.999 say; None accepts all.
 
     Raises:
@@ -60,9 +49,32 @@ def correct(
         NotFiniteError: The correction is not finite.
     """
     x = belief.mean
-    residual = model.residual(measurement.value, model.evaluate(x))
+    expected, H = model.shown(x, measurement)
+    residual = model.residual(measurement.value, expected)
     limit = math.inf if gate is None else chi_square(gate, residual.size)
-    return correct_linear(belief, model.jacobian(x), residual, model.covariance(x, measurement), limit)
+    return correct_linear(belief, H, residual, model.covariance(x, measurement), limit)
+
+
+def correct_iterated(
+    belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None, iterations: int = 5
+) -> tuple[Gaussian, Innovation]:
+    """As `correct`, linearised anew at each result (Gauss-Newton): for ranges as short as their beacon is uncertain.
+
+    The gate judges the first innovation. The last step's derivative makes the covariance (Bell and Cathey 1993).
+    """
+    x = belief.mean
+    result, first = correct(belief, measurement, model, gate)
+    if not first.accepted or model.is_linear:
+        return result, first
+    for _ in range(iterations - 1):
+        before = result.mean
+        expected, H = model.shown(before, measurement)
+        residual = model.residual(measurement.value, expected) - H @ (x - before)
+        result, _ = correct_linear(belief, H, residual, model.covariance(before, measurement))
+        step = result.mean - before
+        if float(step @ step) < 1e-12 * max(1.0, float(before @ before)):
+            break
+    return result, first
 
 
 def correct_linear(
@@ -80,16 +92,25 @@ def correct_linear(
     return (Gaussian(mean=mean, covariance=covariance) if innovation.accepted else belief), innovation
 
 
-def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> Gaussian:
-    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns.
+def fuse(belief: Gaussian, measurement: Measurement, model: MeasurementModel) -> tuple[Gaussian, float]:
+    """The belief after a measurement without a gate, and its NIS: `correct` for those who need no more."""
+    if model.is_angle:
+        H, R = model.jacobian(belief.mean, measurement), model.covariance(belief.mean, measurement)
+        return correct_angle(belief, H, measurement.value, R)
+    corrected, innovation = correct(belief, measurement, model)
+    return corrected, innovation.nis
 
-    The same numbers as of `correct` in half its time, without what it says of the innovation.
+
+def correct_angle(belief: Gaussian, H: Array, value: Array, R: Array) -> tuple[Gaussian, float]:
+    """The belief after a measured angle (1,) [rad] that is H x, H (1, n), but for whole turns; and its NIS.
+
+    The same numbers as of `correct` in half its time.
 
     Raises:
         NotPositiveDefiniteError, NotFiniteError: As `correct`.
     """
-    mean, covariance, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
+    mean, covariance, nis, status = loops.correct_angle(belief.mean, belief.covariance, H, value, R)
     if status != loops.OK:
         residual = np.array([loops.wrap(value[0] - H[0] @ belief.mean)])
-        return correct_linear(belief, H, residual, R)[0]  # says what is wrong
-    return Gaussian(mean=mean, covariance=covariance)
+        correct_linear(belief, H, residual, R)  # says what is wrong
+    return Gaussian(mean=mean, covariance=covariance), nis

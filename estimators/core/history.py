@@ -8,14 +8,15 @@ reaches.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from math import isfinite
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
 from estimators.core import loops
 from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError, ParameterError
-from estimators.core.types import Measurement
+from estimators.core.types import Measurement, Outcome, Verdicts
 
 State = TypeVar("State")
 Input = tuple[float, ...]
@@ -23,10 +24,13 @@ Input = tuple[float, ...]
 REFUSALS = ("future", "too_old", "not_finite", "not_positive_definite", "duplicate")
 
 
+_new = tuple.__new__
+
+
 class Node(Generic[State]):
     """One instant: what was measured then, the input from then to the next node, and the filter's state after it."""
 
-    __slots__ = ("failed", "input", "is_grid", "measurements", "prompt", "state", "time")
+    __slots__ = ("failed", "input", "is_grid", "measurements", "prompt", "revises", "state", "time", "verdicts")
 
     def __init__(self, time: float, u: Input, measurements: list[Measurement], is_grid: bool) -> None:
         self.time = time  # [s]
@@ -36,13 +40,22 @@ class Node(Generic[State]):
         self.is_grid = is_grid  # a tick of the filter, not a time inserted for a measurement
         self.state: State | None = None  # None before the filter has started
         self.failed = False  # the filter could not go on here and started anew
+        self.verdicts: Verdicts = ()  # of its measurements, and those it revised of earlier nodes
+        self.revises = False  # whether there are any of earlier nodes
+
+
+def outcome(measurement: Measurement, reason: str, nis: float = math.nan) -> Outcome:
+    """The fate of a measurement that was refused for a `reason`, or used if that is empty."""
+    m, sequence = measurement, measurement.sequence
+    # Not Outcome(...), which takes twice as long, once at every tick.
+    return _new(Outcome, (m.kind, m.source, m.stamp, -1 if sequence is None else sequence, not reason, reason, nis))
 
 
 class Filter(Protocol[State]):
     """What a history replays. States are immutable and carry all that the next node needs."""
 
     def start(self, nodes: Sequence[Node[State]], index: int) -> State | None:
-        """First state, at a node with measurements; None if they do not suffice. Neighbours may be read only."""
+        """First state, at a node; None if its measurements do not suffice. Neighbours may be read only."""
         ...
 
     def predict(self, state: State, u: Input, duration: float) -> State:
@@ -66,18 +79,33 @@ class History(Generic[State]):
             ("yellow" in the paper), else it gets a node of its own ("blue"), which takes the input of the node before
             it.
         keep: Age up to which measurements are accepted [s]; must exceed the longest delay.
+        verdicts: Reads from a state what the filter decided about each measurement of the state's node, and what it
+            revised there of earlier ones. None: the filter uses all that it is handed.
     """
 
-    def __init__(self, filter: Filter[State], *, step: float, keep: float = 30.0) -> None:
+    def __init__(
+        self,
+        filter: Filter[State],
+        *,
+        step: float,
+        keep: float = 30.0,
+        verdicts: Callable[[State], Verdicts] | None = None,
+    ) -> None:
         if not 0.0 < step <= keep:
             raise ParameterError(f"step {step} s and age kept {keep} s must satisfy 0 < step <= keep")
-        self._filter = filter
+        self._filter, self._verdicts = filter, verdicts
         self._snap = step / 10.0
         self._keep = keep
         self.nodes: list[Node[State]] = []
         self.refused: dict[str, int] = dict.fromkeys(REFUSALS, 0)  # measurements refused so far, by reason
         self.reinitialised = 0  # how often the filter has failed and started anew
-        self._accepted: list[Measurement] = []
+        # What was decided up to the last replay and since the one before, in that order. Replayed measurements are
+        # here again only if they are refused for another reason than before, or no longer.
+        self.outcomes: tuple[Outcome, ...] = ()
+        self._decided: list[Outcome] = []
+        self._reasons: dict[int, str] = {}  # last one reported of each measurement held, by its id
+        self._accepted: dict[tuple, float] = {}  # stamps of measurements taken, by stamp and by number
+        self._most_accepted = 256  # from then on those of long ago are forgotten
         self._touched = 0  # first node whose state is out of date
 
     @property
@@ -91,7 +119,7 @@ class History(Generic[State]):
         Raises:
             ParameterError: The time is not after that of the last tick, or not a number.
         """
-        if not math.isfinite(time) or (self.nodes and time <= self.nodes[-1].time):
+        if not isfinite(time) or (self.nodes and time <= self.nodes[-1].time):
             raise ParameterError(
                 f"tick at {time} s must come after that at {self.nodes[-1].time if self.nodes else 0} s"
             )
@@ -102,9 +130,10 @@ class History(Generic[State]):
         # base of the next.
         oldest = time - self._keep - self._snap
         if self._touched <= 1 < len(self.nodes) and self.nodes[1].time < oldest:
-            self.replay()  # the next node's base must be up to date before it can leave
+            self._advance()  # the next node's base must be up to date before it can leave
         while len(self.nodes) > 1 and self.nodes[1].time < oldest:
-            del self.nodes[0]
+            for measurement in self.nodes.pop(0).measurements:
+                self._reasons.pop(id(measurement), None)
             self._touched = max(0, self._touched - 1)
 
     def insert(self, measurement: Measurement) -> bool:
@@ -115,26 +144,66 @@ class History(Generic[State]):
         node = self.nodes[index]
         node.measurements.append(measurement)
         # Late measurements of one node stand in stamp order, whichever came first.
-        node.measurements[node.prompt :] = sorted(node.measurements[node.prompt :], key=lambda m: (m.stamp, m.kind))
+        node.measurements[node.prompt :] = sorted(
+            node.measurements[node.prompt :], key=lambda m: (m.stamp, m.kind, m.source)
+        )
         self._touched = min(self._touched, index)
         return True
 
     def replay(self) -> State | None:
-        """Brings every node from the earliest touched one up to date and returns the latest state."""
-        nodes, filter = self.nodes, self._filter
-        for index in range(self._touched, len(nodes)):
+        """Brings every node from the earliest touched one up to date and returns the latest state.
+
+        What that decided about measurements is then in `outcomes`.
+        """
+        self._advance()
+        self.outcomes = tuple(self._decided)
+        self._decided.clear()
+        return self.state
+
+    def _advance(self) -> None:
+        nodes, filter, verdicts = self.nodes, self._filter, self._verdicts
+        first, revised = self._touched, False
+        for index in range(first, len(nodes)):
             node = nodes[index]
             before = nodes[index - 1] if index else None
             try:
                 if before is None or before.state is None:
-                    node.state = filter.start(nodes, index) if node.measurements else None
-                    continue
-                state = filter.predict(before.state, before.input, node.time - before.time)
-                node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
+                    node.state = filter.start(nodes, index)
+                else:
+                    state = filter.predict(before.state, before.input, node.time - before.time)
+                    node.state = filter.correct(state, node.time, node.measurements) if node.measurements else state
             except (NotFiniteError, NotPositiveDefiniteError):
                 self._restart(index)
+            if node.measurements:
+                state = node.state
+                node.verdicts = self._unjudged(node) if state is None or verdicts is None else verdicts(state)
+                revises = len(node.verdicts) > len(node.measurements)
+                revised = revised or revises or node.revises  # what it said of earlier nodes may no longer hold
+                node.revises = revises
         self._touched = len(nodes)
-        return self.state
+        if revised:
+            self._report_revised()
+            return
+        reasons, decided = self._reasons, self._decided
+        for index in range(first, len(nodes)):
+            for measurement, reason, nis in nodes[index].verdicts:
+                if reasons.get(key := id(measurement)) != reason:
+                    reasons[key] = reason
+                    decided.append(outcome(measurement, reason, nis))
+
+    def _unjudged(self, node: Node[State]) -> Verdicts:
+        """What became of a node's measurements where the filter does not say it."""
+        reason = "" if node.state is not None else "failed" if node.failed else "not_started"
+        return tuple((measurement, reason, math.nan) for measurement in node.measurements)
+
+    def _report_revised(self) -> None:
+        """Notes the outcomes that differ from those last reported, where nodes speak of earlier ones."""
+        held = {id(measurement) for node in self.nodes for measurement in node.measurements}
+        latest = {id(verdict[0]): verdict for node in self.nodes for verdict in node.verdicts}
+        for key, verdict in latest.items():
+            if key in held and self._reasons.get(key) != verdict[1]:
+                self._reasons[key] = verdict[1]
+                self._decided.append(outcome(*verdict))
 
     def _restart(self, index: int) -> None:
         """Starts the filter at a node where it failed, or leaves that to a later one; counts each such node once."""
@@ -142,13 +211,15 @@ class History(Generic[State]):
         self.reinitialised += not node.failed
         node.failed = True
         try:
-            node.state = self._filter.start(self.nodes, index) if node.measurements else None
+            node.state = self._filter.start(self.nodes, index)
         except (NotFiniteError, NotPositiveDefiniteError):
             node.state = None
 
-    def refuse(self, reason: str) -> bool:
-        """Counts a refused measurement; always False."""
+    def refuse(self, reason: str, measurement: Measurement | None = None) -> bool:
+        """Counts a measurement refused and, where it is given, notes its outcome; always False."""
         self.refused[reason] = self.refused.get(reason, 0) + 1
+        if measurement is not None:
+            self._decided.append(outcome(measurement, reason))
         return False
 
     def _place(self, stamp: float) -> int:
@@ -157,6 +228,8 @@ class History(Generic[State]):
         after = len(nodes)
         while after and nodes[after - 1].time > stamp:
             after -= 1
+        if after and nodes[after - 1].time == stamp and nodes[after - 1].is_grid:  # the common case, cheaply
+            return after - 1
         # Only ticks attract: whether a node was inserted before or after must not matter.
         distance, index = min((abs(nodes[k].time - stamp), k) for k in self._neighbouring_ticks(after))
         if distance < self._snap:
@@ -176,31 +249,37 @@ class History(Generic[State]):
     def _is_sound(self, measurement: Measurement) -> bool:
         """Counts measurements that are not finite or whose covariance is not positive definite."""
         value, covariance = measurement.value, measurement.covariance
-        numbers = (measurement.stamp, *value.tolist(), *covariance.ravel().tolist())
-        if not all(map(math.isfinite, numbers)):
-            return self.refuse("not_finite")
         if value.size == 1:  # the common case, cheaply
-            return numbers[2] > 0.0 or self.refuse("not_positive_definite")
+            variance = covariance.item()
+            if not (isfinite(value.item()) and isfinite(variance) and isfinite(measurement.stamp)):
+                return self.refuse("not_finite", measurement)
+            return variance > 0.0 or self.refuse("not_positive_definite", measurement)
+        if not all(map(isfinite, (measurement.stamp, *value.tolist(), *covariance.ravel().tolist()))):
+            return self.refuse("not_finite", measurement)
         # The factorisation reads one triangle only.
         asymmetry = np.abs(covariance - covariance.T).max()
         is_symmetric = asymmetry <= 1e-9 * np.abs(covariance).max()
-        return (is_symmetric and loops.factor(covariance)[1]) or self.refuse("not_positive_definite")
+        return (is_symmetric and loops.factor(covariance)[1]) or self.refuse("not_positive_definite", measurement)
 
     def _is_timely(self, measurement: Measurement) -> bool:
         """Counts measurements from the future and from before the history."""
         if not self.nodes or measurement.stamp > self.nodes[-1].time:
-            return self.refuse("future")
+            return self.refuse("future", measurement)
         if measurement.stamp < max(self.nodes[-1].time - self._keep, self.nodes[0].time):
-            return self.refuse("too_old")
+            return self.refuse("too_old", measurement)
         return True
 
     def _is_duplicate(self, measurement: Measurement) -> bool:
-        """Counts measurements that came before: same kind, and same sequence number or same stamp."""
-        oldest = self.nodes[-1].time - self._keep
-        self._accepted = [m for m in self._accepted if m.stamp >= oldest]
-        for known in self._accepted:
-            same_number = measurement.sequence is not None and known.sequence == measurement.sequence
-            if known.kind == measurement.kind and (same_number or known.stamp == measurement.stamp):
-                return not self.refuse("duplicate")
-        self._accepted.append(measurement)
+        """Counts measurements that came before: same kind and source, and same sequence number or same stamp."""
+        oldest, known = self.nodes[-1].time - self._keep, self._accepted
+        source, number = (measurement.kind, measurement.source), measurement.sequence
+        by_stamp, by_number = (source, "stamp", measurement.stamp), (source, "number", number)
+        if by_stamp in known or (number is not None and known.get(by_number, -math.inf) >= oldest):
+            return not self.refuse("duplicate", measurement)
+        known[by_stamp] = measurement.stamp
+        if number is not None:
+            known[by_number] = measurement.stamp
+        if len(known) > self._most_accepted:
+            self._accepted = known = {key: stamp for key, stamp in known.items() if stamp >= oldest}
+            self._most_accepted = max(256, 2 * len(known))
         return False

@@ -5,9 +5,11 @@ So a user's machine needs no C compiler.
 
 import hashlib
 import inspect
+import math
 import platform
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from types import ModuleType
+from typing import Any
 
 import casadi as ca
 import numba
@@ -88,7 +90,7 @@ def move(points, u, p, duration, substeps):
 
 @compiled
 def walk(start, inputs, p, h, increments):
-    """States (k + 1, n) from `start`: steps of `h` under `inputs` (k, 2), each followed by its kick (k, n)."""
+    """States (k + 1, n) from `start`: steps of `h` under `inputs` (k, 2), each followed by noise (k, n)."""
     count, n = increments.shape
     states, F = np.empty((count + 1, n)), np.empty((n, n))
     states[0] = start
@@ -98,6 +100,46 @@ def walk(start, inputs, p, h, increments):
     return states
 '''
 
+MOTION_KERNELS = '''
+
+@compiled
+def predict(mean, covariance, u, p, q, qu, duration, substeps):
+    """Mean and covariance after `duration` in equal `substeps`, dx'/dx (n, n), and whether they are finite."""
+    n = mean.size
+    x, following = mean.copy(), np.empty(n)
+    P, F, G, work = covariance.copy(), np.zeros((n, n)), np.zeros((n, qu.size)), np.empty((n, n))
+    total = np.eye(n)
+    h = duration / substeps
+    for _ in range(substeps):
+        step(x, u, p, h, following, F, G)
+        propagate(F, P, q, h, work)
+        for k in range(qu.size):
+            if qu[k] > 0.0:
+                for i in range(n):
+                    for j in range(n):
+                        P[i, j] += h * qu[k] * G[i, k] * G[j, k]
+        if substeps > 1:
+            total = F @ total
+        x, following = following, x
+    if substeps == 1:
+        total = F
+    for index in {wrapped}:
+        x[index] = wrap(x[index])
+    return x, P, total, is_finite(x, P)
+
+
+@compiled
+def move(points, u, p, duration, substeps):
+    """Carries each of `points` (k, n) on by `duration` with the input held, in place and without wrapping angles."""
+    n = points.shape[1]
+    following, F, G = np.empty(n), np.empty((n, n)), np.empty((n, len(u)))
+    h = duration / substeps
+    for point in points:
+        for _ in range(substeps):
+            step(point, u, p, h, following, F, G)
+            point[:] = following
+'''
+
 
 def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleType:
     """Compiles a discrete process model, given as an SX function (x, u, p, h) -> (x', F = dx'/dx).
@@ -105,8 +147,41 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
     The module has `step(x, u, p, h, x', F)`, which fills its last two arguments (F only where it can differ from zero),
     and `predict(mean, covariance, u, p, q, duration, substeps) -> (mean, covariance, finite)`, where q (n,) holds power
     spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi]; and `move` and `walk`
-    for many points and for a long way, see KERNELS.
+    for many points and for long trajectories, see KERNELS.
     """
+    wrapping = repr((*wrapped,)) if wrapped else "range(0)"
+    return _loaded(function, "step", ("x", "u", "p", "h"), ("following", "F"), KERNELS.format(wrapped=wrapping))
+
+
+def motion_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleType:
+    """Compiles a discrete process model, given as an SX function (x, u, p, h) -> (x', dx'/dx, dx'/du / h).
+
+    The module has `predict(mean, covariance, u, p, q, qu, duration, substeps) -> (mean, covariance, dx'/dx, finite)`,
+    with power spectral densities q (n,) of the states' noise and qu (k,) of the inputs'; and `move`.
+    """
+    wrapping = repr((*wrapped,)) if wrapped else "range(0)"
+    kernels = MOTION_KERNELS.format(wrapped=wrapping)
+    return _loaded(function, "step", ("x", "u", "p", "h"), ("following", "F", "G"), kernels, ("F", "G"))
+
+
+def sensor_function(function: ca.Function) -> Callable[[Sequence[float], Sequence[float], list[float], Any], None]:
+    """A sensor (x, z) -> (value, d value/dx) as plain Python `show(x, z, value, H)`, which fills its last two.
+
+    So short that numba gains nothing over lists of numbers, and needs no seconds to compile.
+    """
+    space: dict[str, Any] = {"math": math}
+    exec(python_source(function, "show", ("x", "z"), ("value", "H"), matrices=("H",)), space)
+    return space["show"]
+
+
+def _loaded(
+    function: ca.Function,
+    name: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    kernels: str,
+    matrices: Sequence[str] = (),
+) -> ModuleType:
     loops_hash = hashlib.sha256(inspect.getsource(loops).encode()).hexdigest()[:16]
     source = (
         f"# Written from the CasADi function {function.name()}. Machine code made of it depends on\n"
@@ -114,24 +189,29 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
         "import math\n\nimport numpy as np\n\n"
         "from estimators.core.compiling import compiled\n"
         "from estimators.core.loops import is_finite, propagate, wrap\n\n\n"
-        "@compiled\n"
-        + python_source(function, "step", ("x", "u", "p", "h"), ("following", "F"), scalars=("h",))
-        + KERNELS.format(wrapped=repr((*wrapped,)) if wrapped else "range(0)")
+        "@compiled\n" + python_source(function, name, inputs, outputs, scalars=("h",), matrices=matrices) + kernels
     )
     return load(function.name(), source)
 
 
 def python_source(
-    function: ca.Function, name: str, inputs: Sequence[str], outputs: Sequence[str], scalars: Sequence[str] = ()
+    function: ca.Function,
+    name: str,
+    inputs: Sequence[str],
+    outputs: Sequence[str],
+    scalars: Sequence[str] = (),
+    matrices: Sequence[str] = (),
 ) -> str:
     """Straight-line Python of an SX `function`: reads its inputs, fills the structural nonzeros of its outputs.
+
+    Outputs of one column are vectors, but for those named in `matrices`.
 
     Raises:
         ParameterError: The function holds an operation that has no scalar Python form.
     """
     lines = [f"def {name}({', '.join([*inputs, *outputs])}):"]
     names: dict[int, str] = {}  # work-vector element -> the variable that holds it now; each variable is assigned once
-    places = [_places(function.sparsity_out(k)) for k in range(function.n_out())]
+    places = [_places(function.sparsity_out(k), outputs[k] in matrices) for k in range(function.n_out())]
     for k in range(function.n_instructions()):
         operation = function.instruction_id(k)
         source, target = function.instruction_input(k), function.instruction_output(k)
@@ -154,7 +234,8 @@ def python_source(
     return "\n".join(lines) + "\n"
 
 
-def _places(sparsity: ca.Sparsity) -> list[str]:
+def _places(sparsity: ca.Sparsity, is_matrix: bool) -> list[str]:
     """The index of every structural nonzero, in CasADi's order: "i" of a column, "i, j" of a matrix."""
     rows, columns = sparsity.row(), sparsity.get_col()
-    return [f"{i}" if sparsity.is_column() else f"{i}, {j}" for i, j in zip(rows, columns, strict=True)]
+    is_vector = sparsity.is_column() and not is_matrix
+    return [f"{i}" if is_vector else f"{i}, {j}" for i, j in zip(rows, columns, strict=True)]

@@ -122,13 +122,13 @@ def correct(mean, covariance, H, residual, R, gate):
 
 @compiled
 def correct_angle(mean, covariance, H, value, R):
-    """`correct` by an angle (1,) that is H x but for whole turns; returns only (mean, covariance, status)."""
+    """`correct` by an angle (1,) that is H x but for whole turns; returns only (mean, covariance, NIS, status)."""
     expected = 0.0
     for j in range(mean.size):
         if H[0, j] != 0.0:
             expected += H[0, j] * mean[j]
-    x, P, _, _, _, status = correct(mean, covariance, H, np.array([wrap(value[0] - expected)]), R, math.inf)
-    return x, P, status
+    x, P, _, _, nis, status = correct(mean, covariance, H, np.array([wrap(value[0] - expected)]), R, math.inf)
+    return x, P, nis, status
 
 
 @compiled

@@ -1,4 +1,4 @@
-"""A measurement that may be an outlier: both possibilities are weighed and merged.
+"""Correction by a measurement that may be an outlier: both hypotheses are weighted and merged.
 
 As probabilistic data association does with measurements of uncertain origin (Bar-Shalom and Tse 1975).
 """
@@ -18,13 +18,14 @@ IMPOSSIBLE = -1e300  # log likelihood of what no hypothesis explains
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outliers:
-    """How often a sensor's measurements are wrong, and by how much: an equal mix of normal errors."""
+    """Outliers of a sensor: their probability, and their errors as an equal mixture of normal distributions."""
 
     prior: float = 0.03  # probability of each measurement
-    deviations: tuple[float, ...] = (3.0, 15.0)  # of each component, in the measurement's unit
+    # Of each component, in the measurement's unit; where components differ, one tuple of all components instead.
+    deviations: tuple[float | tuple[float, ...], ...] = (3.0, 15.0)
 
     def __post_init__(self) -> None:
-        if not (0.0 < self.prior < 1.0 and self.deviations and min(self.deviations) > 0.0):
+        if not (0.0 < self.prior < 1.0 and self.deviations and min(np.min(d) for d in self.deviations) > 0.0):
             raise ParameterError(f"prior {self.prior} must lie in 0..1 and deviations {self.deviations} above 0")
 
 
@@ -39,7 +40,7 @@ class MixtureUpdate:
 
 
 def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel, outliers: Outliers) -> MixtureUpdate:
-    """The belief after a measurement that may be an outlier and then says nothing of the state.
+    """The belief after a measurement that may be an outlier, which carries no information on the state.
 
     Raises:
         NotPositiveDefiniteError, NotFiniteError: As `ekf.correct`.
@@ -48,7 +49,7 @@ def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel,
     sound = math.log1p(-outliers.prior) + log_density(innovation.covariance, innovation.residual)
     share = math.log(outliers.prior / len(outliers.deviations))
     wrong = [
-        share + log_density(innovation.covariance + d * d * np.eye(innovation.residual.size), innovation.residual)
+        share + log_density(innovation.covariance + _spread(d, innovation.residual.size), innovation.residual)
         for d in outliers.deviations
     ]
     highest = max(sound, *wrong)
@@ -64,6 +65,19 @@ def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel,
         log_likelihood=highest + math.log(total),
         probability=p,
     )
+
+
+def _spread(deviation: float | tuple[float, ...], size: int) -> Array:
+    """Covariance (m, m) of an outlier's error.
+
+    Raises:
+        ParameterError: There are more or fewer deviations than components.
+    """
+    if isinstance(deviation, tuple):
+        if len(deviation) != size:
+            raise ParameterError(f"outliers' deviations {deviation} must be {size}, one of each component")
+        return np.diag(np.square(deviation))
+    return deviation * deviation * np.eye(size)
 
 
 def log_density(covariance: Array, residual: Array) -> float:

@@ -1,6 +1,6 @@
-"""Smoothing over the delay buffer: what is now known of the states then (Rauch, Tung and Striebel 1965).
+"""Fixed-lag smoothing over the delay buffer: past states given all measurements (Rauch, Tung and Striebel 1965).
 
-Fixed lag: the buffer reaches back as far as it keeps nodes, and each of its poses is refined by all that came after.
+The buffer reaches back as far as it keeps nodes, and each of its poses is refined by all that came after.
 """
 
 from collections.abc import Callable, Sequence
@@ -14,14 +14,14 @@ from estimators.core.types import Gaussian, ProcessModel
 
 
 def smooth(
-    nodes: Sequence[Node[Any]], process_after: Callable[[Any], ProcessModel], angles: tuple[int, ...] = (2,)
+    nodes: Sequence[Node[Any]], process_after: Callable[[Any], ProcessModel], angles: tuple[int, ...] | None = None
 ) -> list[Gaussian]:
     """The belief at each of the nodes since the filter's last start, given all measurements of all nodes.
 
     Args:
         nodes: Nodes of a `History` that is up to date; their states have a `belief`.
         process_after: The process model by which the filter went on from a state.
-        angles: States that are angles, kept in (-pi, pi].
+        angles: States that are angles, kept in (-pi, pi]; None: those of the process.
     """
     smoothed: list[Gaussian] = []
     following = 0.0  # time of the node after
@@ -31,7 +31,9 @@ def smooth(
         belief = node.state.belief
         if smoothed:
             process, duration = process_after(node.state), following - node.time
-            belief = _refined(belief, smoothed[-1], process, node.input, duration, angles)
+            belief = _refined(
+                belief, smoothed[-1], process, node.input, duration, process.angles if angles is None else angles
+            )
         smoothed.append(belief)
         following = node.time
     return smoothed[::-1]

@@ -32,21 +32,17 @@ def sigma_points(belief: Gaussian) -> tuple[Array, Array]:
 def predict(belief: Gaussian, process: ProcessModel, u: Sequence[float], dt: float) -> Gaussian:
     """The belief after `dt` [s] with the input `u` held: moments of the moved sigma points, plus Q.
 
-    A process with a `move(points, u, dt) -> points` of its own, which does not wrap angles, moves them with that; and
-    one with `wrap_angles(mean) -> mean` has its angles wrapped at the end.
-
     Raises:
         NotFiniteError: The prediction is not finite.
         NotPositiveDefiniteError: The covariance is not positive definite.
     """
     points, weights = sigma_points(belief)
-    move = getattr(process, "move", None)
-    moved = np.array([process.evaluate(x, u, dt) for x in points]) if move is None else move(points, u, dt)
-    mean, P = loops.moments(moved, weights, process.covariance(belief.mean, u, dt))
+    mean, P = loops.moments(process.move(points, u, dt), weights, process.covariance(belief.mean, u, dt))
     if not loops.is_finite(mean, P):
         raise NotFiniteError(f"prediction over {dt:g} s from {belief.mean} with input {u} is not finite")
-    wrap_angles = getattr(process, "wrap_angles", None)
-    return Gaussian(mean=mean if wrap_angles is None else wrap_angles(mean), covariance=P)
+    for index in process.angles:
+        mean[index] = loops.wrap(mean[index])
+    return Gaussian(mean=mean, covariance=P)
 
 
 def correct(
@@ -56,10 +52,10 @@ def correct(
 
     A sensor whose model says that it `is_linear` needs no sigma points: its derivative gives the same.
     """
-    if getattr(model, "is_linear", False):
+    if model.is_linear:
         return ekf.correct(belief, measurement, model, gate)
     points, weights = sigma_points(belief)
-    values = [model.evaluate(x) for x in points]
+    values = [model.evaluate(x, measurement) for x in points]
     # Differences from the central value, so that angles may be wrapped.
     shown = np.array([model.residual(value, values[0]) for value in values])
     mean = weights @ shown

@@ -1,33 +1,19 @@
-"""The docking filter with the current in its state: a Kalman filter whose gate cannot lock it out."""
+"""The docking filter with the current in its state: a Kalman filter whose gate recovers from its own errors."""
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple, Unpack
+from typing import Literal, Unpack
 
-from estimators.core import ekf, ukf
-from estimators.core.consistency import chi_square
-from estimators.core.ekf import Innovation
-from estimators.core.errors import ParameterError
-from estimators.core.history import Input, Node
-from estimators.core.types import Gaussian, Measurement
-from estimators.docking import recovery
-from estimators.docking.models import COMPASS, USBL, DockingNoise, ModelOptions, PlanarModels
-from estimators.docking.recovery import Rejected
-from estimators.planar.model import PlanarParameters, PlanarProcess
+from estimators.core.filter import FilterState, ModelFilter
+from estimators.docking.models import USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.recovery import FixRecovery
+from estimators.planar.model import PlanarParameters
+
+__all__ = ["AugmentedFilter", "AugmentedState", "Transform"]
 
 Transform = Literal["extended", "unscented"]
-TRANSFORMS = {"extended": ekf, "unscented": ukf}
+AugmentedState = FilterState  # its belief is of [north, east, psi, u, v, r, c_n, c_e, biases]
 
 
-class AugmentedState(NamedTuple):
-    """What a node keeps: the belief of [north, east, psi, u, v, r, c_n, c_e, biases] and what the gate remembers."""
-
-    belief: Gaussian
-    outliers: int = 0  # fixes rejected so far
-    rejected: tuple[Rejected, ...] = ()
-    innovation: Innovation | None = None  # of the last fix
-
-
-class AugmentedFilter:
+class AugmentedFilter(ModelFilter):
     """Planar Kalman filter with the current as a random walk (sec. 12 of the paper), for a `History`.
 
     The gate: a fix whose normalised innovation squared exceeds the chi-square quantile of probability `gate` is
@@ -44,12 +30,12 @@ class AugmentedFilter:
     The gate widens while fixes are missing. So a fix that comes after a rejected one and is inside the gate, but
     outside its inner 95 %, is compared too: else a belief wrong by some metres would be mended by a wrong current.
 
-    Fixes far noisier than believed may never agree; so after four rejected in a row, whatever their age, the next one
+    Fixes far noisier than assumed may never agree; so after four rejected in a row, whatever their age, the next one
     is taken with the last of them.
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise, and the biases that it estimates besides.
+        noise: Noise that it assumes, and the biases that it estimates besides.
         gate: Probability with which a fix that fits is accepted; None accepts all.
         transform: "extended" (EKF) or "unscented" (UKF).
         **options: See `PlanarModels`.
@@ -64,54 +50,10 @@ class AugmentedFilter:
         transform: Transform = "extended",
         **options: Unpack[ModelOptions],
     ) -> None:
-        if transform not in TRANSFORMS:
-            raise ParameterError(f"no transform '{transform}'; there are {', '.join(TRANSFORMS)}")
         self.parameters = parameters
         self.noise = noise or DockingNoise()
-        self.models = PlanarModels(parameters, self.noise, **options)
-        self._kalman = TRANSFORMS[transform]
-        self._gate = gate
-
-    def start(self, nodes: Sequence[Node[AugmentedState]], index: int) -> AugmentedState | None:
-        """State at the first fix; a second fix at the same node is fused."""
-        first = self.models.first(nodes, index)
-        if first is None:
-            return None
-        belief, fix = first
-        others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        return self.correct(AugmentedState(belief), nodes[index].time, others)
-
-    def predict(self, state: AugmentedState, u: Input, duration: float) -> AugmentedState:
-        """State after `duration` [s]."""
-        belief = self._kalman.predict(state.belief, self.models.process, u, duration)
-        return AugmentedState(belief, state.outliers, state.rejected, state.innovation)
-
-    def correct(self, state: AugmentedState, node_time: float, measurements: Sequence[Measurement]) -> AugmentedState:
-        """State after the compass samples and fixes of a node."""
-        for measurement in measurements:
-            if measurement.kind == COMPASS:
-                belief = self.models.fuse_heading(state.belief, measurement)
-                state = AugmentedState(belief, state.outliers, state.rejected, state.innovation)
-            elif measurement.kind == USBL:
-                state = self._fuse_fix(state, measurement)
-        return state
-
-    def process_after(self, state: AugmentedState) -> PlanarProcess:
-        """For `smoothing`."""
-        return self.models.process
-
-    def _fuse_fix(self, state: AugmentedState, fix: Measurement) -> AugmentedState:
-        position = self.models.position
-        belief, innovation = self._kalman.correct(state.belief, fix, position, self._gate)
-        if innovation.accepted and (not state.rejected or innovation.nis <= chi_square(recovery.PROBABLE, 2)):
-            return AugmentedState(belief, state.outliers, (), innovation)
-        now = Rejected(fix.stamp, innovation.residual, position.jacobian(state.belief.mean), fix.covariance)
-        for earlier in recovery.agreeing(now, state.rejected, self.noise)[:1]:
-            recovered = recovery.recover(state.belief, earlier, now, self.noise)
-            return AugmentedState(recovered, state.outliers - 1, (), innovation)
-        if innovation.accepted:
-            return AugmentedState(belief, state.outliers, (), innovation)
-        if len(state.rejected) >= recovery.REMEMBERED:
-            recovered = recovery.recover(state.belief, state.rejected[-1], now, self.noise)
-            return AugmentedState(recovered, state.outliers, (), innovation)
-        return AugmentedState(state.belief, state.outliers + 1, (*state.rejected, now), innovation)
+        self.models = models = PlanarModels(parameters, self.noise, **options)
+        recovery = FixRecovery(self.noise)
+        super().__init__(
+            models.process, models.sensors, models.start, gates={USBL: gate}, recovery=recovery, transform=transform
+        )

@@ -1,22 +1,23 @@
 """Navigation of a vehicle that a dock locates acoustically: Qiu and Li (2019), a USBL-based method for homing.
 
 The dock measures the transponder in its own frame and sends it by modem, with its attitude: every fix is old when it
-arrives. Eq. 7 (into the world) is in `usbl`, eq. 11 (the current) here. World axes are (north, east) throughout.
+arrives. Eq. 7 (into the world) is in `usbl`, eq. 11 (the current) in `paper`. World axes are (north, east) throughout.
 """
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple, Protocol, Unpack
+from operator import attrgetter
+from typing import Any, Protocol
 
 import numpy as np
 
-from estimators.core import ekf, smoothing
+from estimators.core import smoothing
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
-from estimators.core.history import Filter, History, Input, Node
+from estimators.core.history import Filter, History, Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, Outcome, ProcessModel
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.interacting import InteractingFilter
 from estimators.docking.models import (
@@ -26,14 +27,11 @@ from estimators.docking.models import (
     REFERENCE_NOISE,
     REGULAR_NOISE,
     ROBUST_NOISE,
-    USBL,
     Bias,
     DockingNoise,
-    ModelOptions,
-    PlanarModels,
 )
-from estimators.docking.usbl import UsblFix, UsblModel, horizontal_rotation
-from estimators.planar.model import PlanarParameters
+from estimators.docking.paper import PaperFilter, estimate_current
+from estimators.docking.usbl import UsblFix, UsblModel, horizontal_rotation, raw_fix
 
 __all__ = [
     "INTERACTING_NOISE",
@@ -55,106 +53,6 @@ __all__ = [
 ]
 
 
-def estimate_current(
-    history: Sequence[tuple[float, float]],
-    weights: Array,
-    gain: Array,
-    residual: Array,
-    interval: float,
-) -> tuple[float, float]:
-    """Eq. 11: V_n = a_0 V_(n-m) + ... + a_(m-1) V_(n-1) + a_m (V_(n-1) + K_C (z_n - p_n^-) / (t_n - t_(n-1))).
-
-    Args:
-        history: The last m estimates (north, east), oldest first [m/s].
-        weights: (m + 1,) a_0 .. a_m, positive, of sum 1.
-        gain: K_C (2, 2), the position's gain on the position.
-        residual: z_n - p_n^- (2,), fix minus predicted position [m].
-        interval: t_n - t_(n-1) between the stamps [s].
-    """
-    past = np.array((*history, history[-1]))
-    north, east = weights @ past + weights[-1] * (gain @ residual) / interval
-    return float(north), float(east)
-
-
-class PaperState(NamedTuple):
-    """What a node keeps: the belief, its states 7, 8 the current of eq. 11 without covariance; eq. 11's memory."""
-
-    belief: Gaussian
-    currents: tuple[tuple[float, float], ...]  # last m estimates, oldest first [m/s]
-    last_fix: float  # stamp of the fix before [s]
-    innovation: Innovation | None = None  # of the last fix
-    outliers: int = 0  # it has no gate
-
-
-class PaperFilter:
-    """The paper's improved filter: six states, the current by eq. 11 beside them; for a `History`.
-
-    It has no gate: its covariance does not know the current's error, so that a gate would lock it out. For the same
-    reason the position noise is inflated, and its covariance is not consistent.
-
-    Without `weights` the current stays zero: the paper's regular filter, if delays are not compensated either (see
-    `DockingEstimator`), and its half-measure, if they are.
-
-    Args:
-        parameters: The vehicle.
-        noise: What it believes of its noise; that of the current is not used.
-        weights: a_0 .. a_m of eq. 11; None leaves the current zero.
-        **options: See `PlanarModels`; the paper's integrator is "euler" with substeps of 0.5 s.
-    """
-
-    def __init__(
-        self,
-        parameters: PlanarParameters,
-        noise: DockingNoise = PAPER_NOISE,
-        *,
-        weights: tuple[float, ...] | None = (0.3, 0.3, 0.4),
-        **options: Unpack[ModelOptions],
-    ) -> None:
-        if weights is not None and (len(weights) < 2 or min(weights) <= 0.0 or abs(sum(weights) - 1.0) > 1e-9):
-            raise ParameterError(f"weights {weights} of eq. 11 must be two or more, above 0, of sum 1")
-        # With no covariance, the augmented model is the six-state one with a given current.
-        self.parameters = parameters
-        self.noise = replace(noise, current=0.0, initial_current=0.0, biases={})
-        self._weights = None if weights is None else np.array(weights)
-        self.models = PlanarModels(parameters, self.noise, **options)
-
-    def start(self, nodes: Sequence[Node[PaperState]], index: int) -> PaperState | None:
-        """State at the first fix, with no current; a second fix at the same node is fused."""
-        first = self.models.first(nodes, index)
-        if first is None:
-            return None
-        belief, fix = first
-        memory = 0 if self._weights is None else len(self._weights) - 1
-        state = PaperState(belief, ((0.0, 0.0),) * memory, fix.stamp)
-        others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        return self.correct(state, nodes[index].time, others)
-
-    def predict(self, state: PaperState, u: Input, duration: float) -> PaperState:
-        """State after `duration` [s]; eq. 12."""
-        belief = ekf.predict(state.belief, self.models.process, u, duration)
-        return PaperState(belief, state.currents, state.last_fix, state.innovation)
-
-    def correct(self, state: PaperState, node_time: float, measurements: Sequence[Measurement]) -> PaperState:
-        """State after the compass samples and fixes of a node."""
-        for measurement in measurements:
-            if measurement.kind == COMPASS:
-                belief = self.models.fuse_heading(state.belief, measurement)
-                state = PaperState(belief, state.currents, state.last_fix, state.innovation)
-            elif measurement.kind == USBL:
-                state = self._fuse_fix(state, measurement)
-        return state
-
-    def _fuse_fix(self, state: PaperState, fix: Measurement) -> PaperState:
-        belief, innovation = ekf.correct(state.belief, fix, self.models.position)
-        interval = fix.stamp - state.last_fix
-        if self._weights is None or abs(interval) < 1e-6:
-            return state._replace(belief=belief, innovation=innovation)
-        gain = innovation.gain[:2, :2]
-        current = estimate_current(state.currents, self._weights, gain, innovation.residual, interval)
-        belief.mean[6:] = current
-        return PaperState(belief, (*state.currents[1:], current), fix.stamp, innovation)
-
-
 @dataclass(frozen=True, kw_only=True, slots=True)
 class DockingEstimate:
     """What a docking estimator knows at one time; zeros before the first fix."""
@@ -167,15 +65,22 @@ class DockingEstimate:
     refused: Mapping[str, int]  # measurements refused so far, by reason; "outlier" by the filter's gate
     reinitialised: int = 0  # how often the filter had to start anew, because its numbers were no longer finite
     innovation: Innovation | None = None  # of the latest fix, by stamp, that the filter has seen
+    # Fates of measurements decided since the last tick. One whose verdict a replay or a recovery has changed is here
+    # again: of several outcomes of a measurement the last one holds.
+    outcomes: tuple[Outcome, ...] = ()
 
 
 class DockingFilter(Filter[Any], Protocol):
     """A filter for a `DockingEstimator`.
 
-    Its states have `belief` (eight states and biases), `outliers` and `innovation`.
+    Its states have `belief` (eight states and biases), `outliers`, `innovation` and `verdicts`, see `History`.
     """
 
     noise: DockingNoise
+
+    def process_after(self, state: Any) -> ProcessModel:
+        """The process by which it went on from a state, for `smoothing`; ParameterError if there is none that fits."""
+        ...
 
 
 class DockingEstimator:
@@ -183,7 +88,7 @@ class DockingEstimator:
 
     Args:
         filter: `AugmentedFilter`, `InteractingFilter`, `PaperFilter`, or one of that form.
-        usbl: What is believed of the dock's USBL.
+        usbl: Model of the dock's USBL.
         step: Nominal time between ticks [s].
         keep: Age up to which fixes are used [s].
         compensate_delay: False takes every fix as made at the tick it arrives at, whatever its stamp or number: the
@@ -208,7 +113,9 @@ class DockingEstimator:
 
     def reset(self) -> None:
         """Forgets everything, counts included."""
-        self._history: History[Any] = History(self._filter, step=self._step, keep=self._keep)
+        self._history: History[Any] = History(
+            self._filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
+        )
         self._restarts = 0  # of the filter
         self._outliers_before = self._outliers = 0  # rejected before its last start, and in all
 
@@ -218,11 +125,8 @@ class DockingEstimator:
         Raises:
             ParameterError: The filter cannot be smoothed: its covariance does not hold the error of the current.
         """
-        process_after = getattr(self._filter, "process_after", None)
-        if process_after is None:
-            raise ParameterError(f"a {type(self._filter).__name__} cannot be smoothed; an AugmentedFilter can")
         nodes = self._history.nodes
-        beliefs = smoothing.smooth(nodes, process_after)
+        beliefs = smoothing.smooth(nodes, self._filter.process_after)
         return [(node.time, belief) for node, belief in zip(nodes[len(nodes) - len(beliefs) :], beliefs, strict=True)]
 
     @property
@@ -255,7 +159,7 @@ class DockingEstimator:
             if self._usbl.reaches(fix):
                 measurements.append(self._usbl.world_fix(fix))
             else:
-                history.refuse("implausible")
+                history.refuse("implausible", raw_fix(fix))
         if not self._compensate_delay:
             prompt += [replace(m, stamp=time) for m in measurements]
             measurements = []
@@ -284,4 +188,5 @@ class DockingEstimator:
             refused={**history.refused, "outlier": self._outliers},
             reinitialised=history.reinitialised,
             innovation=None if state is None else state.innovation,
+            outcomes=history.outcomes,
         )

@@ -2,61 +2,32 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import NamedTuple, Unpack
+from typing import Unpack
 
 import numpy as np
 
-from estimators.core import ekf, imm, loops, outliers
-from estimators.core.consistency import chi_square
-from estimators.core.ekf import Innovation
-from estimators.core.errors import ParameterError
-from estimators.core.history import Input, Node
-from estimators.core.outliers import MixtureUpdate, Outliers
-from estimators.core.types import Array, Gaussian, Measurement
-from estimators.docking import recovery
-from estimators.docking.models import COMPASS, ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
-from estimators.docking.recovery import Rejected
+from estimators.core.interacting import InteractingModelFilter, InteractingState
+from estimators.core.outliers import Outliers
+from estimators.core.types import Array
+from estimators.docking.models import ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.recovery import FixRecovery
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
-ANGLES = (2,)  # the heading
-SHORTEST = 0.1  # time between fixes that counts at least, so that no mode ever dies out [s]
-TRUSTED = 3  # fixes taken before the filter believes itself more than two fixes that agree against it
+__all__ = ["InteractingFilter", "InteractingState"]
 
 
-class InteractingState(NamedTuple):
-    """What a node keeps: each mode's belief and probability, and what is remembered of fixes."""
-
-    beliefs: tuple[Gaussian, ...]
-    weights: Array  # (m,) probabilities of the modes
-    last_fix: float  # stamp of the last fix [s]
-    accepted: int = 1  # fixes taken so far
-    outliers: int = 0  # fixes more probably wrong than not, so far
-    rejected: tuple[Rejected, ...] = ()
-    innovation: Innovation | None = None  # of the last fix, in the mode most probable then
-
-    @property
-    def belief(self) -> Gaussian:
-        """The modes' beliefs merged."""
-        return imm.merge(self.beliefs, self.weights, ANGLES)
-
-
-class InteractingFilter:
+class InteractingFilter(InteractingModelFilter):
     """Interacting extended Kalman filters that differ in how fast the current may change (sec. 13), for a `History`.
 
-    Each fix is weighed against being an outlier in each mode. Modes change at constant rates, however often
-    fixes come: right after a fix, by what the time since the fix before it allows. The compass says nothing of the
-    modes, which share the heading.
-
-    A filter that takes good fixes for outliers, because it is wrong itself, is set right as `AugmentedFilter` is, by
-    fixes that agree against it: by two if it has taken fewer than three, as after a wrong first fix, else by three.
+    The compass says nothing of the modes, which share the heading.
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise, but for the current's; and the biases that it estimates besides.
+        noise: Noise that it assumes, the current's excepted; and the biases that it estimates besides.
         currents: Random walk of the current in each mode [m^2/s^3], the slowest first.
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at the first fix (m,).
-        outliers: What is believed of fixes that are wrong.
+        outliers: Model of outliers among the fixes.
         **options: See `PlanarModels`.
     """
 
@@ -72,92 +43,19 @@ class InteractingFilter:
         **options: Unpack[ModelOptions],
     ) -> None:
         self.parameters, self.noise = parameters, noise
-        rates, self._initial = np.array(switching, dtype=float), np.array(initial, dtype=float)
-        self._generator = _generator(rates, len(currents))
-        shaped = self._initial.shape == (len(currents),) and (self._initial > 0.0).all()
-        if not (shaped and abs(self._initial.sum() - 1.0) < 1e-9):
-            raise ParameterError(f"initial {list(initial)} must be {len(currents)} probabilities above 0 of sum 1")
-        self.models = PlanarModels(parameters, noise, **options)
-        self._currents = np.array(currents, dtype=float)
-        self._processes = [self.models.process_with(replace(noise, current=current)) for current in currents]
-        self._outliers = outliers or Outliers()
+        self.models = models = PlanarModels(parameters, noise, **options)
+        densities = np.array(currents, dtype=float)
 
-    def start(self, nodes: Sequence[Node[InteractingState]], index: int) -> InteractingState | None:
-        """State at the first fix; a second fix at the same node is fused."""
-        first = self.models.first(nodes, index)
-        if first is None:
-            return None
-        belief, fix = first
-        others = [m for m in nodes[index].measurements if m.kind == USBL and m is not fix]
-        state = InteractingState((belief,) * len(self._processes), self._initial, fix.stamp)
-        return self.correct(state, nodes[index].time, others)
+        def blended(weights: Array) -> PlanarProcess:
+            return models.process_with(replace(noise, current=float(weights @ densities)))
 
-    def predict(self, state: InteractingState, u: Input, duration: float) -> InteractingState:
-        """State after `duration` [s]."""
-        modes = zip(state.beliefs, self._processes, strict=True)
-        return state._replace(beliefs=tuple(ekf.predict(belief, process, u, duration) for belief, process in modes))
-
-    def correct(
-        self, state: InteractingState, node_time: float, measurements: Sequence[Measurement]
-    ) -> InteractingState:
-        """State after the compass samples and fixes of a node."""
-        for measurement in measurements:
-            if measurement.kind == COMPASS:
-                beliefs = tuple(self.models.fuse_heading(belief, measurement) for belief in state.beliefs)
-                state = state._replace(beliefs=beliefs)
-            elif measurement.kind == USBL:
-                state = self._fuse_fix(state, measurement)
-        return state
-
-    def process_after(self, state: InteractingState) -> PlanarProcess:
-        """For `smoothing`: the merged belief moves on with the modes' mean noise."""
-        return self.models.process_with(replace(self.noise, current=float(state.weights @ self._currents)))
-
-    def _fuse_fix(self, state: InteractingState, fix: Measurement) -> InteractingState:
-        position = self.models.position
-        modes = [outliers.correct(belief, fix, position, self._outliers) for belief in state.beliefs]
-        weights = imm.update(state.weights, [mode.log_likelihood for mode in modes])
-        innovation = modes[int(weights.argmax())].innovation
-        rejected: tuple[Rejected, ...] = ()
-        count = state.outliers
-        is_wrong = bool(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5)
-        # A fix that the filter would take, but only just, may as well confirm one that it did not take.
-        if is_wrong or (state.rejected and innovation.nis > chi_square(recovery.PROBABLE, 2)):
-            now = self._rejected(state, fix, modes)
-            agreeing = recovery.agreeing(now, state.rejected, self.noise)
-            needed = 1 if state.accepted < TRUSTED else 2
-            if len(agreeing) >= needed or (is_wrong and len(state.rejected) >= recovery.REMEMBERED):
-                earlier = agreeing[0] if agreeing else state.rejected[-1]
-                recovered = recovery.recover(state.belief, earlier, now, self.noise)
-                beliefs = (recovered,) * len(modes)
-                return InteractingState(beliefs, self._initial, fix.stamp, 2, count - len(agreeing), (), innovation)
-            rejected = (*state.rejected, now) if is_wrong else ()
-            count += is_wrong
-        accepted = state.accepted + (not rejected)
-        transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
-        beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, ANGLES)
-        return InteractingState(beliefs, weights, fix.stamp, accepted, count, rejected, innovation)
-
-    def _rejected(self, state: InteractingState, fix: Measurement, modes: Sequence[MixtureUpdate]) -> Rejected:
-        """The fix as seen by the modes together, before it was used."""
-        residual = np.sum([w * m.innovation.residual for w, m in zip(state.weights, modes, strict=True)], axis=0)
-        H = self.models.position.jacobian(state.belief.mean)
-        return Rejected(fix.stamp, residual, H, fix.covariance)
-
-
-def _generator(rates: Array, modes: int) -> Array:
-    """Rates of a Markov chain (m, m) with the diagonal that makes its rows sum to zero.
-
-    Raises:
-        ParameterError: They are not rates between that many modes, or leave a mode that is never reached.
-    """
-    Q = rates.copy() if rates.shape == (modes, modes) else np.full((modes, modes), -1.0)
-    np.fill_diagonal(Q, 0.0)
-    # Every mode leads to every other, at once or by way of others.
-    if (Q < 0.0).any() or not (np.linalg.matrix_power(np.eye(modes) + (Q > 0.0), modes) > 0.0).all():
-        raise ParameterError(
-            f"{modes} modes need a row and a column of switching rates each, none below 0, that lead from every mode "
-            f"to every other; not {rates.tolist()}"
+        super().__init__(
+            [models.process_with(replace(noise, current=current)) for current in currents],
+            models.sensors,
+            models.start,
+            switching=switching,
+            initial=initial,
+            mixtures={USBL: outliers or Outliers()},
+            recovery=FixRecovery(noise),
+            blended=blended,
         )
-    np.fill_diagonal(Q, -Q.sum(axis=1))
-    return Q

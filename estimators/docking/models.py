@@ -1,4 +1,4 @@
-"""What filters on the planar model share: noise, the compass and position models, and the start from a first fix."""
+"""Models that the docking filters share: noise, compass, position, and the start from a first fix."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -7,11 +7,10 @@ from typing import TypedDict
 
 import numpy as np
 
-from estimators.core import ekf
 from estimators.core.errors import ParameterError
 from estimators.core.history import Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
 from estimators.planar.model import BIASES, MAX_SUBSTEP, Biases, Integrator, PlanarParameters, PlanarProcess
 
 COMPASS, USBL = "compass", "usbl"  # kinds of measurement
@@ -19,7 +18,7 @@ COMPASS, USBL = "compass", "usbl"  # kinds of measurement
 
 @dataclass(frozen=True, slots=True)
 class Bias:
-    """What is believed of a constant error before it is estimated; units as in `planar_model.BIASES`."""
+    """Prior of a constant error before it is estimated; units as in `planar_model.BIASES`."""
 
     deviation: float  # standard deviation of its first value
     density: float = 0.0  # of its random walk [its unit squared per second]
@@ -27,10 +26,10 @@ class Bias:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class DockingNoise:
-    """What a docking filter believes of its noise; process noise as power spectral densities.
+    """Noise that a docking filter assumes; process noise as power spectral densities.
 
-    The defaults fit a vehicle whose planar model is a condensed one: accelerations are trusted ten times less than
-    those of the reference study, in which truth and filter shared the model.
+    The defaults suit a planar model that was fitted to a vehicle: the process noise of its accelerations is ten times
+    that of the reference study, in which truth and filter shared the model.
     """
 
     position: float = 4e-4  # [m^2/s]
@@ -77,10 +76,10 @@ ROBUST_NOISE = replace(INTERACTING_NOISE, biases=BIASES_OF_VEHICLE)
 REGULAR_NOISE = replace(PAPER_NOISE, position=1.0)  # the best for a filter that knows neither current nor delay
 
 
-class HeadingModel:
+class HeadingModel(MeasurementModel):
     """A compass: y = psi, plus the state `bias` if given; a MeasurementModel of `n` states, psi the third."""
 
-    is_linear = True
+    is_linear = is_angle = True
 
     def __init__(self, n: int = 8, bias: int | None = None) -> None:
         self._bias = bias
@@ -88,20 +87,17 @@ class HeadingModel:
         if bias is not None:
             self._H[0, bias] = 1.0
 
-    def evaluate(self, x: Array) -> Array:
+    def evaluate(self, x: Array, measurement: Measurement | None = None) -> Array:
         return x[2:3] if self._bias is None else x[2:3] + x[self._bias]
 
-    def jacobian(self, x: Array) -> Array:
+    def jacobian(self, x: Array, measurement: Measurement | None = None) -> Array:
         return self._H
-
-    def covariance(self, x: Array, measurement: Measurement) -> Array:
-        return measurement.covariance
 
     def residual(self, value: Array, expected: Array) -> Array:
         return np.array((wrap(float(value[0]) - float(expected[0])),))
 
 
-class PositionModel:
+class PositionModel(MeasurementModel):
     """The horizontal position (north, east) of a point (x, y) [m] of the hull, forward and starboard of its origin.
 
     As the dock reports it: turned about the dock by the error of its compass, the state `dock_heading`, and taken later
@@ -121,20 +117,13 @@ class PositionModel:
         self._dock_heading, self._clock = dock_heading, clock
         self.is_linear = dock_heading is None and clock is None and point == (0.0, 0.0)
 
-    def evaluate(self, x: Array) -> Array:
-        return self._shown(x)[0]
+    def evaluate(self, x: Array, measurement: Measurement | None = None) -> Array:
+        return self.shown(x)[0]
 
-    def jacobian(self, x: Array) -> Array:
-        return self._shown(x)[1]
+    def jacobian(self, x: Array, measurement: Measurement | None = None) -> Array:
+        return self.shown(x)[1]
 
-    def covariance(self, x: Array, measurement: Measurement) -> Array:
-        return measurement.covariance
-
-    def residual(self, value: Array, expected: Array) -> Array:
-        return value - expected
-
-    def _shown(self, x: Array) -> tuple[Array, Array]:
-        """Value and Jacobian."""
+    def shown(self, x: Array, measurement: Measurement | None = None) -> tuple[Array, Array]:
         c, s = math.cos(x[2]), math.sin(x[2])
         H = self._H.copy()
         north, east = c * self._x - s * self._y, s * self._x + c * self._y
@@ -151,7 +140,7 @@ class PositionModel:
             H[:, self._clock] = ahead + x[6], abeam + x[7]
         value = np.array((x[0] + north, x[1] + east))
         if self._dock_heading is not None:
-            # The dock takes its heading for larger than it is, and so the bearing of all it sees.
+            # The dock's heading is measured too large, and with it the bearing of all that the dock measures.
             c, s = math.cos(x[self._dock_heading]), math.sin(x[self._dock_heading])
             R = np.array(((c, -s), (s, c)))
             value, H = R @ value, R @ H
@@ -186,11 +175,11 @@ class ModelOptions(TypedDict, total=False):
 
 
 class PlanarModels:
-    """The process and measurement models of a docking filter, made of what it believes; and its start.
+    """Process and measurement models of a docking filter, made from its assumptions; and its start.
 
     Args:
         parameters: The vehicle.
-        noise: What the filter believes of its noise, and the biases in its state.
+        noise: Noise that the filter assumes, and the biases in its state.
         transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
         initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
         integrator: "midpoint" or "euler".
@@ -222,9 +211,18 @@ class PlanarModels:
         """The same vehicle with other densities of the process noise."""
         return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
 
-    def fuse_heading(self, belief: Gaussian, sample: Measurement) -> Gaussian:
-        """Belief after a compass sample; the sensor is linear, so that this holds for every Kalman filter."""
-        return ekf.correct_angle(belief, self.heading.jacobian(belief.mean), sample.value, sample.covariance)
+    @property
+    def sensors(self) -> dict[str | tuple[str, str], MeasurementModel]:
+        """The measurement models by kind."""
+        return {COMPASS: self.heading, USBL: self.position}
+
+    def start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+        """`first`, and the measurements that are in it: the fix and the compass, not further fixes."""
+        found = self.first(nodes, index)
+        if found is None:
+            return None
+        belief, fix = found
+        return belief, [m for m in nodes[index].measurements if m is fix or m.kind != USBL]
 
     def first(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, Measurement] | None:
         """Belief at the node of a first fix, and that fix; None without a fix there or any compass sample.
@@ -247,11 +245,11 @@ class PlanarModels:
         biases = [noise.biases[name].deviation for name in names]
         covariance = np.diag(np.square([0.0, 0.0, *deviations, *currents, *biases]))
         covariance[:2, :2] = fix.covariance
-        # What the compass shows too much the heading has too much.
+        # A compass bias is an error of the initial heading.
         J = np.eye(mean.size)
         if "compass" in names:
             J[2, 8 + names.index("compass")] = -1.0
-        # The fix is known, so that the position takes on the errors of all else that it shows.
+        # The fix is given, so that the position takes the errors of all other states in it.
         onto = np.eye(mean.size)
         onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
         J = onto @ J

@@ -1,34 +1,21 @@
 """How a filter that rejects fixes finds out that it is wrong itself: fixes that disagree with it, but not together."""
 
-from typing import NamedTuple
+from collections.abc import Sequence
 
 import numpy as np
 
 from estimators.core import ekf
 from estimators.core.consistency import chi_square
-from estimators.core.types import Array, Gaussian
+from estimators.core.recovery import AGREEMENT, MAX_AGE, Rejected
+from estimators.core.types import Gaussian, MeasurementModel
 from estimators.docking.models import DockingNoise
 
-REMEMBERED = 4  # rejected fixes that are kept; the next one then is taken in any case
-PROBABLE = 0.95  # probability of fixes that are not compared even after a rejected one
-AGREEMENT = 0.99  # probability with which two good fixes are found to agree
-MAX_AGE = 30.0  # age at which a rejected fix says nothing more of the present [s]
 
-
-class Rejected(NamedTuple):
-    """A fix that was taken for an outlier, kept until a fix is accepted."""
-
-    stamp: float  # [s]
-    residual: Array  # (2,) against the prediction at its time [m]
-    H: Array  # (2, n)
-    covariance: Array  # (2, 2) of the fix [m^2]
-
-
-def agreeing(now: Rejected, rejected: tuple[Rejected, ...], noise: DockingNoise) -> list[Rejected]:
+def agreeing(now: Rejected, rejected: Sequence[Rejected], noise: DockingNoise) -> list[Rejected]:
     """Those of the `rejected` fixes that agree with that of `now` and with each other, the latest first."""
     found: list[Rejected] = []
     for earlier in reversed(rejected):
-        if now.stamp - earlier.stamp <= MAX_AGE and agree(now, [*found, earlier], noise):
+        if now.measurement.stamp - earlier.measurement.stamp <= MAX_AGE and agree(now, [*found, earlier], noise):
             found.append(earlier)
     return found
 
@@ -40,28 +27,51 @@ def agree(now: Rejected, earlier: list[Rejected], noise: DockingNoise) -> bool:
     is forgotten. So two fixes agree if they lie within reach of such a current, and three only if they nearly move
     along: wrong fixes do so far more rarely.
     """
-    ages = np.array([now.stamp - fix.stamp for fix in earlier])
+    ages = np.array([now.measurement.stamp - rejected.measurement.stamp for rejected in earlier])
     shorter, longer = np.minimum.outer(ages, ages), np.maximum.outer(ages, ages)
     # Of an integrated random walk between two ages (Wahba 1978).
     walk = shorter**2 * (3.0 * longer - shorter) / (6.0 * MAX_AGE)
     drift = noise.initial_current**2 * (np.outer(ages, ages) + walk)
-    S = np.kron(drift, np.eye(2)) + np.kron(np.ones_like(drift), now.covariance)
-    for k, fix in enumerate(earlier):
-        S[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += fix.covariance
-    change = np.concatenate([fix.residual - now.residual for fix in earlier])
+    S = np.kron(drift, np.eye(2)) + np.kron(np.ones_like(drift), now.measurement.covariance)
+    for k, rejected in enumerate(earlier):
+        S[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += rejected.measurement.covariance
+    change = np.concatenate([rejected.residual - now.residual for rejected in earlier])
     return float(change @ np.linalg.solve(S, change)) <= chi_square(AGREEMENT, change.size)
 
 
 def recover(belief: Gaussian, earlier: Rejected, now: Rejected, noise: DockingNoise) -> Gaussian:
     """Belief with position and current opened up and both fixes fused, the earlier one carried to now."""
-    T = now.stamp - earlier.stamp
+    T = now.measurement.stamp - earlier.measurement.stamp
     covariance = belief.covariance.copy()
     covariance[[0, 1], [0, 1]] += now.residual @ now.residual + earlier.residual @ earlier.residual
     covariance[[6, 7], [6, 7]] += noise.initial_current**2
     H = np.vstack((now.H, earlier.H))
     H[2:, 6:8] -= T * np.eye(2)  # then, the error of the position was smaller by what the current's has added since
     R = np.zeros((4, 4))
-    R[:2, :2] = now.covariance
-    R[2:, 2:] = earlier.covariance + (noise.position * T + noise.current * T**3 / 3.0) * np.eye(2)
+    R[:2, :2] = now.measurement.covariance
+    R[2:, 2:] = earlier.measurement.covariance + (noise.position * T + noise.current * T**3 / 3.0) * np.eye(2)
     residual = np.concatenate((now.residual, earlier.residual))
     return ekf.correct_linear(Gaussian(mean=belief.mean, covariance=covariance), H, residual, R)[0]
+
+
+class FixRecovery:
+    """The `Recovery` of a filter on the planar model: its position and its current are opened, both fixes fused."""
+
+    fuses_both = forces = True
+
+    def __init__(self, noise: DockingNoise) -> None:
+        self._noise = noise
+
+    def suffice(
+        self, now: Rejected, rejected: Sequence[Rejected], agreeing: Sequence[Rejected], cautious: bool = False
+    ) -> bool:
+        """One agreeing fix: it takes two to find the position and the current; for the cautious, two."""
+        return len(agreeing) >= 1 + cautious
+
+    def agreeing(self, now: Rejected, rejected: Sequence[Rejected]) -> list[Rejected]:
+        """Those of the rejected fixes that agree with that of now and with each other, the latest first."""
+        return agreeing(now, rejected, self._noise)
+
+    def recover(self, belief: Gaussian, earlier: Rejected, now: Rejected, model: MeasurementModel) -> Gaussian:
+        """The belief with both fixes fused."""
+        return recover(belief, earlier, now, self._noise)

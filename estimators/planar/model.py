@@ -20,17 +20,16 @@ from estimators.core import loops
 from estimators.core.compiling import is_ready
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.kernels import step_kernels
-from estimators.core.types import Array
+from estimators.core.types import Array, ProcessModel
 
 Integrator = Literal["euler", "midpoint"]
 
-# surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: what the vehicle's compass
-# shows too much [rad]; dock_heading: what the dock's compass shows too much [rad]; clock: how much later than its stamp
-# a fix was taken [s].
+# surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: bias of the vehicle's
+# compass [rad]; dock_heading: bias of the dock's compass [rad]; clock: time from a fix's stamp to its true time [s].
 BIASES = ("surge", "compass", "dock_heading", "clock")
 Biases = tuple[str, ...]  # a selection, in the order of BIASES
 
-# Velocities beyond these are no motion of such a vehicle but an outlier's kick; the quadratic damping there would make
+# Velocities beyond these come from outliers, not from the vehicle's motion; the quadratic damping there would make
 # explicit steps of up to MAX_SUBSTEP unstable, so the accelerations are those at the limit.
 SURGE_LIMIT, SWAY_LIMIT, YAW_RATE_LIMIT = 4.0, 2.0, 0.5  # [m/s, m/s, rad/s]
 MAX_SUBSTEP = 0.17  # [s]
@@ -182,7 +181,7 @@ def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: B
     loops.wrap(0.0)
 
 
-class PlanarProcess:
+class PlanarProcess(ProcessModel):
     """The planar vehicle as a ProcessModel, in substeps short enough for an explicit integrator.
 
     Args:
@@ -193,6 +192,8 @@ class PlanarProcess:
         max_substep: Longest substep [s].
         biases: Those in the state, of BIASES.
     """
+
+    angles = (2,)  # the heading
 
     def __init__(
         self,
@@ -251,12 +252,6 @@ class PlanarProcess:
         moved = np.array(points, dtype=float)
         self._move(moved, (float(u[0]), float(u[1])), self._p, dt, self._substeps(dt))
         return moved
-
-    def wrap_angles(self, mean: Array) -> Array:
-        """The same state with its heading in (-pi, pi]."""
-        wrapped = mean.copy()
-        wrapped[2] = loops.wrap(wrapped[2])
-        return wrapped
 
     def walk(self, start: Array, inputs: Array, step: float, increments: Array) -> Array:
         """A sampled trajectory (k + 1, n) in steps of `step` [s]; angles are not wrapped.

@@ -4,18 +4,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from synthetic import ATTRIBUTES
+from synthetic import trial_log, writer
 
 from auvsim.analysis import manoeuvre_plots
 from auvsim.base.errors import InputError
-from auvsim.data.log import TrialLog
-from auvsim.data.recorder import LogWriter
+from auvsim.data.log import VehicleLog
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import ProgressState, run_trial
+from auvsim.simulation.run import ProgressState, run
 
 
 @pytest.fixture(scope="module")
-def log() -> TrialLog:
+def log() -> VehicleLog:
     """A straight run, then a coarse spiral, across 180 degrees."""
     parts = [
         {"kind": "straight", "duration": 20.0, "approach": 10.0},
@@ -23,10 +22,10 @@ def log() -> TrialLog:
     ]
     pinned = {"manoeuvre": {"kind": "sequence", "parts": parts}, "vehicle": {"start": {"heading_deg": 175.0}}}
     plan = sampling.merge(sampling.manoeuvre_plan("sequence"), pinned)
-    return run_trial(scenario.parse(sampling.draw(plan, 2)), seed=2)
+    return run(scenario.parse(sampling.draw(plan, 2)), seed=2).vehicle()
 
 
-def test_lines_are_those_of_the_log(log: TrialLog) -> None:
+def test_lines_are_those_of_the_log(log: VehicleLog) -> None:
     """Truth and measurements without jumps at 180 degrees; the spiral has its curve; approaches are marked."""
     figure = manoeuvre_plots.manoeuvre_figure(log)
     axes = {panel.get_title(): panel for panel in figure.axes}
@@ -47,28 +46,27 @@ def test_lines_are_those_of_the_log(log: TrialLog) -> None:
     assert figure.get_suptitle().startswith("Seed 2, trial 0: straight; spiral: yaw rate per rudder at zero 0.")
 
 
-def test_a_manoeuvre_that_was_stopped_can_be_drawn(log: TrialLog, tmp_path: Path) -> None:
+def test_a_manoeuvre_that_was_stopped_can_be_drawn(log: VehicleLog, tmp_path: Path) -> None:
     """In its first approach, before anything could be read off it; the picture is whole."""
-    plan = scenario.from_yaml(str(log.attributes["scenario"]))
+    plan = scenario.from_yaml(str(log.log.attributes["scenario"]))
 
     def stop(state: ProgressState) -> None:
         raise KeyboardInterrupt
 
-    short = run_trial(plan, seed=2, progress=stop)
-    assert (short.attributes["status"], short["truth"]["time"][-1]) == ("interrupted", pytest.approx(6.0))
+    short = run(plan, seed=2, progress=stop).vehicle()
+    assert (short.log.attributes["status"], short["truth"]["time"][-1]) == ("interrupted", pytest.approx(6.0))
     manoeuvre_plots.manoeuvre(short, tmp_path / "stopped.png")
     assert (tmp_path / "stopped.png").read_bytes().startswith(b"\x89PNG")
     assert [path.name for path in tmp_path.iterdir()] == ["stopped.png"]
 
 
-def test_what_cannot_be_drawn_is_refused(log: TrialLog, tmp_path: Path) -> None:
+def test_what_cannot_be_drawn_is_refused(log: VehicleLog, tmp_path: Path) -> None:
     """A docking trial, an empty log, a folder that is not there."""
-    attributes = {**ATTRIBUTES, "scenario": str(log.attributes["scenario"])}
+    empty = writer("manoeuvre", mission_settings=str(log.attributes["mission_settings"])).finish("interrupted")
     with pytest.raises(InputError, match="nothing was logged"):
-        manoeuvre_plots.manoeuvre(LogWriter(attributes=attributes, fins=4).finish("interrupted"), tmp_path / "x.png")
-    attributes = {**ATTRIBUTES, "scenario": "duration: 10.0"}
-    with pytest.raises(InputError, match="docking trial"):
-        manoeuvre_plots.manoeuvre(LogWriter(attributes=attributes, fins=4).finish("complete"), tmp_path / "x.png")
+        manoeuvre_plots.manoeuvre(empty, tmp_path / "x.png")
+    with pytest.raises(InputError, match="is docking, not a manoeuvre"):
+        manoeuvre_plots.manoeuvre(trial_log(), tmp_path / "x.png")
     with pytest.raises(InputError, match="cannot be written"):
         manoeuvre_plots.manoeuvre(log, tmp_path / "none" / "x.png")
     assert list(tmp_path.iterdir()) == []

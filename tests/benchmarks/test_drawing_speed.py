@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from auvsim.simulation import sampling, scenario, trial
+from auvsim.simulation import run, sampling, scenario
 from auvsim.video.playback import Playback
 from auvsim.video.stage import Stage
 from auvsim.video.storyboard import Frame
@@ -13,7 +13,7 @@ from auvsim.video.storyboard import Frame
 @pytest.fixture(scope="module")
 def playback() -> Playback:
     plan = scenario.parse(sampling.draw(sampling.merge(sampling.default_plan(), {"duration": 60.0}), 1))
-    return Playback(trial.run_trial(plan, seed=1))
+    return Playback(run.run(plan, seed=1))
 
 
 @pytest.fixture(params=["follow", "overview", "dock", "three views"])

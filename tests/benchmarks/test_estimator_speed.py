@@ -4,6 +4,7 @@ Run with `pytest tests/benchmarks/test_estimator_speed.py --benchmark-enable`; t
 (`pip install auvsim[compare]`) are handed the same compiled model, so that only the filters themselves are compared.
 """
 
+import math
 import multiprocessing
 import time
 from concurrent.futures import ProcessPoolExecutor
@@ -16,6 +17,11 @@ import pytest
 from auvsim.reproduce.paper1.runs import Conditions, simulate, track
 from auvsim.reproduce.paper1.study import FILTERS
 from estimators.core import ekf
+from estimators.core.estimator import Estimator
+from estimators.core.filter import ModelFilter
+from estimators.core.models import sensors
+from estimators.core.models.motion import unicycle
+from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
 from estimators.docking.models import REFERENCE_NOISE, HeadingModel
 from estimators.planar.model import PRESTERO, PlanarProcess
@@ -159,3 +165,92 @@ def test_hundred_runs_of_6000_s_on_two_cores(benchmark, name):
 
     parts = benchmark.pedantic(batch, rounds=1).sum(axis=0) / 2.0
     benchmark.extra_info |= {"simulations [s]": round(parts[0], 1), "filters [s]": round(parts[1], 1)}
+
+
+BEACONS = {"a": (45.0, 5.0, 0.0), "b": (-30.0, 35.0, 0.0), "c": (-10.0, -50.0, 0.0), "d": (20.0, -20.0, 0.0)}
+RANGE_STEP, SPEED_SIGMA, TURN_SIGMA, RANGE_SIGMA = 0.2, 0.05, 0.01, 0.3
+PRIOR = Gaussian(mean=np.array([5.0, -5.0, 0.3]), covariance=np.diag([1.0, 1.0, 0.01]))
+
+
+def range_run(count=600):
+    """True positions (k, 2), odometry, and the ranges of each time: a unicycle among beacons, two minutes."""
+    rng, x, states, odometry, seen = np.random.default_rng(1), PRIOR.mean, [], [], []
+    for k in range(count):
+        states.append(x[:2])
+        turn = 0.15 * math.sin(0.05 * RANGE_STEP * k)
+        odometry.append((1.0 + SPEED_SIGMA * rng.standard_normal(), turn + TURN_SIGMA * rng.standard_normal()))
+        near = [name for number, name in enumerate(BEACONS) if k and k % 5 == number]
+        distances = [(n, math.dist(x[:2], BEACONS[n][:2]) + RANGE_SIGMA * rng.standard_normal()) for n in near]
+        seen.append(distances)
+        middle = x[2] + 0.5 * RANGE_STEP * turn
+        x = x + RANGE_STEP * np.array([math.cos(middle), math.sin(middle), turn])
+    return np.array(states), odometry, seen
+
+
+def position_rms(means, states):
+    return float(np.sqrt(np.mean(np.sum((np.array(means)[100:, :2] - states[100:]) ** 2, axis=1))))
+
+
+def test_ranges_here(benchmark):
+    """A unicycle's odometry and ranges, 600 ticks, delay buffer and fates of measurements included."""
+    states, odometry, seen = range_run()
+    motion = unicycle()
+    noise = {"speed": SPEED_SIGMA**2 * RANGE_STEP, "turn_rate": TURN_SIGMA**2 * RANGE_STEP}
+    process = MotionProcess(motion, {"north": 1e-6, "east": 1e-6, "heading": 1e-8}, input_noise=noise)
+    models = {("range", name): sensors.range_to(motion, place) for name, place in BEACONS.items()}
+    R = np.array([[RANGE_SIGMA**2]])
+
+    def tracked():
+        estimator, means = Estimator(ModelFilter(process, models, PRIOR), step=RANGE_STEP), []
+        for k in range(len(states)):
+            time_ = RANGE_STEP * k
+            measurements = [
+                Measurement(
+                    kind="range", source=n, value=np.array([d]), covariance=R, stamp=time_, received=time_, sequence=k
+                )
+                for n, d in seen[k]
+            ]
+            belief = estimator.tick(time_, odometry[max(k - 1, 0)], measurements).belief
+            assert belief is not None
+            means.append(belief.mean)
+        return means
+
+    assert position_rms(benchmark(tracked), states) < 0.3
+
+
+def test_ranges_in_gtsam(benchmark):
+    """The same odometry, ranges, prior and noise in GTSAM's incremental smoother (iSAM2), by its own factors."""
+    gtsam = pytest.importorskip("gtsam")
+    states, odometry, seen = range_run()
+    sigmas = gtsam.noiseModel.Diagonal.Sigmas
+    between = sigmas(np.array([RANGE_STEP * SPEED_SIGMA + 5e-4, 5e-4, RANGE_STEP * TURN_SIGMA]))
+    ranging, known = gtsam.noiseModel.Isotropic.Sigma(1, RANGE_SIGMA), gtsam.noiseModel.Isotropic.Sigma(2, 1e-6)
+    X, L = gtsam.symbol_shorthand.X, gtsam.symbol_shorthand.L
+    numbers = {name: number for number, name in enumerate(BEACONS)}
+
+    def tracked():
+        smoother, graph, values = gtsam.ISAM2(), gtsam.NonlinearFactorGraph(), gtsam.Values()
+        pose, means = gtsam.Pose2(*PRIOR.mean), []
+        graph.add(gtsam.PriorFactorPose2(X(0), pose, sigmas(np.sqrt(np.diagonal(PRIOR.covariance)))))
+        values.insert(X(0), pose)
+        for name, number in numbers.items():
+            graph.add(gtsam.PriorFactorPoint2(L(number), np.array(BEACONS[name][:2]), known))
+            values.insert(L(number), np.array(BEACONS[name][:2]))
+        for k in range(len(states)):
+            if k:
+                speed, turn = odometry[k - 1]
+                half = 0.5 * RANGE_STEP * turn
+                way = RANGE_STEP * speed
+                moved = gtsam.Pose2(way * math.cos(half), way * math.sin(half), 2.0 * half)
+                graph.add(gtsam.BetweenFactorPose2(X(k - 1), X(k), moved, between))
+                values.insert(X(k), pose.compose(moved))
+            for name, distance in seen[k]:
+                graph.add(gtsam.RangeFactor2D(X(k), L(numbers[name]), distance, ranging))
+            smoother.update(graph, values)
+            graph.resize(0)
+            values.clear()
+            pose = smoother.calculateEstimatePose2(X(k))
+            means.append((pose.x(), pose.y()))
+        return means
+
+    assert position_rms(benchmark(tracked), states) < 0.3

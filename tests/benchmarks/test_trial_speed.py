@@ -9,47 +9,47 @@ from collections.abc import Iterator
 from functools import cache
 from itertools import chain, pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
+from auvsim.analysis.summary import summarise
 from auvsim.base.reading import Reading
 from auvsim.data import log
-from auvsim.data.log import TrialLog
-from auvsim.missions.docking import metrics
-from auvsim.navigation.navigator import Commands, Estimate
+from auvsim.data.log import Log
+from auvsim.navigation.estimate import Estimate
 from auvsim.physics import planar_fit
 from auvsim.physics.truth import Truth
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import Loop, run_trial
+from auvsim.simulation.run import Simulation, run
+from auvsim.vehicles.actuation import Commands
 
 SEED = 7
 ROUNDS = 5
 
 
-class Recording(Loop):
-    """A trial that keeps what its parts were given."""
+class Recording(Simulation):
+    """A run that keeps what its parts were given."""
 
     def __init__(self) -> None:
-        super().__init__(plan(), SEED, 0)
-        self.truths: list[Truth] = []
+        super().__init__(plan(), SEED)
+        self.kept_truths: list[Truth] = []
         self.readings: list[list[Reading]] = []
         self.estimates: list[Estimate | None] = []
+        self._act, self.agents[0].act = self.agents[0].act, self._keep  # type: ignore[method-assign]
 
-    def _sense(self, previous: Truth, now: Truth) -> list[Reading]:
-        readings = super()._sense(previous, now)
-        self.truths.append(now)
-        self.readings.append(readings)
-        return readings
-
-    def _act(self) -> None:
-        self.estimates.append(self._estimate)
-        super()._act()
+    def _keep(self, time: float, latched: str | None, log: Any) -> Any:
+        agent = self.agents[0]
+        self.kept_truths.append(self.truths[agent.name])
+        self.readings.append(agent._readings)
+        self.estimates.append(agent.estimate)
+        return self._act(time, latched, log)
 
 
 @cache
 def plan(factory: str = "augmented_ekf") -> scenario.Scenario:
     """The trial that is timed."""
-    values = sampling.merge(sampling.default_plan(), {"estimator": {"factory": factory}})
+    values = sampling.merge(sampling.default_plan(), {"estimator": {"kind": factory}})
     return scenario.parse(sampling.draw(values, SEED))
 
 
@@ -63,9 +63,9 @@ def recording() -> Recording:
 
 
 @pytest.fixture(scope="module")
-def finished(recording: Recording) -> TrialLog:
+def finished(recording: Recording) -> Log:
     """Its log."""
-    return recording.finish("complete", 1.0)
+    return recording.log.finish("complete", wall_time=1.0)
 
 
 @pytest.fixture
@@ -78,21 +78,21 @@ def report(benchmark, recording: Recording) -> Iterator[None]:
 
 @pytest.mark.benchmark(group="one trial")
 def test_whole_trial(benchmark, report, recording: Recording) -> None:
-    trial = benchmark.pedantic(run_trial, (plan(),), {"seed": SEED}, rounds=ROUNDS, warmup_rounds=1)
-    assert metrics.summarise(trial).docked
-    assert trial["truth"]["time"][-1] == recording.time
+    trial = benchmark.pedantic(run, (plan(),), {"seed": SEED}, rounds=ROUNDS, warmup_rounds=1)
+    assert summarise(trial.vehicle())["docked"]
+    assert trial.vehicle()["truth"]["time"][-1] == recording.time
 
 
 @pytest.mark.benchmark(group="one trial")
 def test_setting_up(benchmark, report) -> None:
     """Models read and compiled, estimator made."""
-    assert benchmark.pedantic(Loop, (plan(), SEED, 0), rounds=ROUNDS).ticks == 0
+    assert benchmark.pedantic(Simulation, (plan(), SEED), rounds=ROUNDS).ticks == 0
 
 
 @pytest.mark.benchmark(group="one trial")
 def test_physics_alone(benchmark, report, recording: Recording) -> None:
     """The same number of steps, straight ahead."""
-    world = Loop(plan(), SEED, 0).world
+    world = Simulation(plan(), SEED).world
     per_tick = round(plan().rates.physics / plan().rates.control)
 
     def steps() -> None:
@@ -106,21 +106,20 @@ def test_physics_alone(benchmark, report, recording: Recording) -> None:
 @pytest.mark.benchmark(group="one trial")
 def test_truth_and_sensors(benchmark, report, recording: Recording) -> None:
     """The truth of every tick, and what is measured and sent of it."""
-    loops = []
+    truths = recording.kept_truths
 
-    def fresh() -> tuple[tuple[Loop], dict]:
-        loops.append(Loop(plan(), SEED, 0))
-        return (loops[-1],), {}
-
-    def sense(loop: Loop) -> int:
-        count = 0
-        for previous, now in pairwise(recording.truths):
-            loop.world.truth()
-            loop.ticks += 1
-            count += len(loop._sense(previous, now))
+    def sense(simulation: Simulation) -> int:
+        (agent,), count = simulation.agents, 0
+        for tick, (previous, now) in enumerate(pairwise(truths), start=1):
+            simulation.world.truth(agent.name)
+            agent.sense(tick, now, simulation.world, simulation.log)
+            simulation.network.poll({agent.name: previous}, {agent.name: now})
+            agent.receive(simulation.network.deliver(agent.name, now.time))
+            count += len(agent._readings)
         return count
 
-    assert benchmark.pedantic(sense, setup=fresh, rounds=ROUNDS) > 3 * recording.ticks - 10
+    fresh = {"setup": lambda: ((Simulation(plan(), SEED),), {}), "rounds": ROUNDS}
+    assert benchmark.pedantic(sense, **fresh) > 3 * recording.ticks - 10
 
 
 @pytest.mark.benchmark(group="one trial")
@@ -130,12 +129,12 @@ def test_estimator(benchmark, report, recording: Recording, factory: str) -> Non
     every = round(plan().rates.control / plan().rates.filter)
     starts = range(0, recording.ticks - every + 1, every)
     batches = [list(chain.from_iterable(recording.readings[k : k + every])) for k in starts]
-    navigator = Loop(plan(factory), SEED, 0).navigator
+    navigator = Simulation(plan(factory), SEED).agents[0].navigator
 
     def updates() -> Estimate:
         navigator.reset()
         for k, batch in enumerate(batches, start=1):
-            last = navigator.update(k / plan().rates.filter, batch, Commands(0.0, 0.0, 0.0))
+            last = navigator.update(k / plan().rates.filter, batch, (), Commands(0.0, 0.0, 0.0))
         return last
 
     assert benchmark.pedantic(updates, rounds=ROUNDS).initialised
@@ -146,45 +145,52 @@ def test_guidance_and_control(benchmark, report, recording: Recording) -> None:
     """Every tick: readings observed, a heading and a depth wanted, fins and shaft commanded."""
     period = 1.0 / plan().rates.control
 
-    def act(loop: Loop) -> Commands:
-        guidance, autopilot = loop.guidance, loop.autopilot
+    def act(simulation: Simulation) -> Commands:
+        (agent,) = simulation.agents
         for k, (readings, estimate) in enumerate(zip(recording.readings, recording.estimates, strict=True), start=1):
-            guidance.observe(readings)
-            autopilot.observe(readings)
-            heading, depth = autopilot.heading, autopilot.depth
-            if heading is not None and depth is not None:
-                commands = autopilot.command(*guidance.update(k * period, estimate, heading, depth, False))
-                loop.world.command(*commands)
-        return commands
+            agent.controller.observe(readings)
+            agent.estimate, agent._to_mission = estimate, readings
+            commands = agent.act(k * period, None, simulation.log)
+            if commands is not None:
+                simulation.world.command(agent.name, agent.vehicle.actuation.allocate(commands))
+        return agent.commands
 
-    fresh = benchmark.pedantic(act, setup=lambda: ((Loop(plan(), SEED, 0),), {}), rounds=ROUNDS)
+    fresh = benchmark.pedantic(act, setup=lambda: ((Simulation(plan(), SEED),), {}), rounds=ROUNDS)
     assert fresh.shaft_speed > 0.0
 
 
 @pytest.mark.benchmark(group="one trial")
 def test_making_the_log(benchmark, report, recording: Recording) -> None:
     """Rows to arrays, at the end."""
-    trial = benchmark.pedantic(recording.log.finish, ("complete",), rounds=ROUNDS)
-    assert len(trial["truth"]["time"]) == recording.ticks + 1
+    found = benchmark.pedantic(lambda made: made.log.finish("complete"), setup=lambda: ((_run(),), {}), rounds=ROUNDS)
+    assert len(found.vehicle()["truth"]["time"]) == recording.ticks + 1
+
+
+def _run() -> Simulation:
+    """The trial, run and not yet finished."""
+    simulation = Simulation(plan(), SEED)
+    while not simulation.over:
+        simulation.step()
+    return simulation
 
 
 @pytest.mark.benchmark(group="round a trial")
-def test_condense(benchmark) -> None:
+def test_planar_fit(benchmark) -> None:
     """The planar model of the vehicle, once a process."""
 
     def anew() -> planar_fit.PlanarFit:
-        planar_fit.fit_planar_model.cache_clear()
-        return planar_fit.fit_planar_model("remus100", 1.0, plan().world.water_density)
+        planar_fit._fit_model.cache_clear()
+        return planar_fit.fit_planar_model("remus100", 1.0, plan().water.density)
 
     assert benchmark.pedantic(anew, rounds=ROUNDS).shaft_speed > 0.0
 
 
 @pytest.mark.benchmark(group="round a trial")
-def test_writing_the_log(benchmark, finished: TrialLog, tmp_path: Path) -> None:
+def test_writing_the_log(benchmark, finished: Log, tmp_path: Path) -> None:
     benchmark.pedantic(log.write, (finished, tmp_path / "trial.nc"), rounds=ROUNDS)
     assert (tmp_path / "trial.nc").stat().st_size > 100_000
 
 
 @pytest.mark.benchmark(group="round a trial")
-def test_summary(benchmark, finished: TrialLog) -> None:
-    assert benchmark.pedantic(metrics.summarise, (finished,), rounds=ROUNDS).docked
+def test_summary(benchmark, finished: Log) -> None:
+    assert benchmark.pedantic(summarise, (finished.vehicle(),), rounds=ROUNDS)["docked"]

@@ -46,12 +46,11 @@ def nothing(tasks: Any) -> None:
 def trial(task: Any) -> SimpleNamespace:
     """In the place of `trials.run`: at once, and docked in two of three trials.
 
-    Two keys of the scenario, put to this use, say which trial is to end how, and where to leave marks of attempts.
+    Settings of an estimator of one's own say which trial is to end how, and where to leave marks of attempts.
     """
     values = task.values
-    what, folder = values["estimator"]["factory"], values["estimator"]["model"]
-    name, _, rest = what.partition(":")
-    numbers = {int(number) for number in rest.split(",") if number}
+    settings = values["estimator"]["settings"]
+    name, numbers, folder = settings["ending"], settings["trials"], settings["marks"]
     number = task.trial
     if Path(folder).is_dir():
         with open(Path(folder, f"{task.variant}-{number}"), "a") as marks:
@@ -69,11 +68,11 @@ def trial(task: Any) -> SimpleNamespace:
     quality = {"samples": 10, "position_rms": speed, "nees_per_dof": 1.0, "coverage_95": 0.95}
     quality |= dict.fromkeys(("heading_rms_deg", "velocity_rms", "current_rms"))
     summary = {
-        "status": "complete", "docked": docked, "failure_reason": None if docked else "timeout",
-        "failure_text": None if docked else "too late", "attempts": 1 + number % 2, "time": 100.0 + speed,
-        "miss_distance": speed / 3.0, "heading_error_deg": 0.1, "crossings": [], "contact_impulse": 0.0,
-        "peak_contact_force": 0.0, "estimate": {"all": quality}, "fixes_sent": 9, "fixes_lost": 1,
-        "fixes_outliers": 0, "fixes_refused": 0,
+        "status": "complete", "docked": docked, "docked_first": docked and number % 2 == 0, "time": 100.0 + speed,
+        "failure_reason": None if docked else "timeout", "failure_text": None if docked else "too late",
+        "attempts": 1 + number % 2, "miss_distance": speed / 3.0, "cross_track": None, "vertical": None,
+        "heading_error_deg": 0.1, "crossings": [], "contact_impulse": 0.0, "peak_contact_force": 0.0,
+        "estimate": {"all": quality}, "fixes_sent": 9, "fixes_lost": 1, "fixes_outliers": 0, "fixes_refused": 0,
     }  # fmt: skip
     run = {"wall_time": time.monotonic(), "cpu_time": 0.0, "host": "here", "process": os.getpid()}
     return SimpleNamespace(summary=summary, error=None, run=run, log=b"log" * 1000 if task.keep == "all" else None)

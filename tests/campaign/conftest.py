@@ -21,7 +21,10 @@ def planned(tmp_path: Path) -> Callable[..., plan.Plan]:
     """Makes a plan of light trials: which of them end how, where marks are left, and other keys of the plan."""
 
     def make(ending: str = "none", marks: Path | None = None, **keys: object) -> plan.Plan:
-        pins = {"estimator": {"factory": ending, "model": str(marks or tmp_path / "nowhere")}}
+        name, _, numbers = ending.partition(":")
+        trials = [int(number) for number in numbers.split(",") if number]
+        settings = {"ending": name, "trials": trials, "marks": str(marks or tmp_path / "nowhere")}
+        pins = {"estimator": {"kind": "light:estimator", "settings": settings}}
         values = {"seed": 4, "trials": 12, "timeout": 30.0, "variants": {"a": pins, "b": {**pins, "duration": 300.0}}}
         return plan.parse(values | keys)
 

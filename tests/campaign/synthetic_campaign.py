@@ -4,9 +4,10 @@ import math
 
 import numpy as np
 
+from auvsim.analysis.statistics import wilson
+from auvsim.campaign.columns import layout
 from auvsim.campaign.report import Content
 from auvsim.campaign.statistics import Difference, Nees, Rate
-from auvsim.missions.docking.metrics import wilson
 
 VARIANTS = ("careful", "<b>bold</b>")  # a name may hold anything
 TRIALS = 60
@@ -82,6 +83,7 @@ def content(**changes) -> Content:
         "state": {"engine": "processes", "jobs": 2, "versions": {"auvsim": "0.1.0"}, "wall_time": 61.0},
         "files": ("plan.yaml", "table.csv"),
         "drawn": DRAWN,
+        "layout": layout(("docking",)),
         "rows": table,
         "rates": rates(table, variants),
         "differences": [Difference(quantity="docked", **difference)],

@@ -11,11 +11,11 @@ from pathlib import Path
 
 import pytest
 
+from auvsim.analysis.statistics import wilson
 from auvsim.campaign import execution, table
 from auvsim.campaign.folder import Folder, open_folder
 from auvsim.campaign.local import Pool
 from auvsim.campaign.plan import Plan
-from auvsim.missions.docking.metrics import wilson
 
 Planned = Callable[..., Plan]
 AGAIN = "; it had not finished the first time either"
@@ -138,8 +138,8 @@ def test_progress(planned: Planned, tmp_path: Path) -> None:
         execution.run(plan, tmp_path / "c", pool, seen.append)
         assert [state.done for state in seen] == list(range(1, 25))
         assert {state.total for state in seen} == {24}
-        assert (seen[-1].docked, seen[-1].errors, seen[-1].remaining) == (14, 2, 0.0)
-        assert all(later.docked >= state.docked for state, later in pairwise(seen))
+        assert (seen[-1].successes, seen[-1].errors, seen[-1].remaining) == (14, 2, 0.0)
+        assert all(later.successes >= state.successes for state, later in pairwise(seen))
         open_folder(tmp_path / "c").record_path("a", 0).unlink()
         execution.run(plan, tmp_path / "c", pool, seen.append)
     assert [state.done for state in seen[24:]] == [24]

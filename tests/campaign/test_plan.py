@@ -10,9 +10,9 @@ from auvsim import cli
 from auvsim.base.errors import InputError
 from auvsim.campaign import plan
 from auvsim.cli import options
-from auvsim.simulation import sampling
+from auvsim.simulation import sampling, scenario
 
-VARIANTS = {"fast": {"guidance": {"approach_speed": 1.6}}, "imm": {"estimator": {"factory": "imm"}}}
+VARIANTS = {"fast": {"guidance": {"approach_speed": 1.6}}, "imm": {"estimator": {"kind": "imm"}}}
 
 
 def drawn(values: dict) -> dict:
@@ -23,11 +23,11 @@ def drawn(values: dict) -> dict:
 
 def test_a_trial_is_that_of_auvsim_dock(tmp_path: Path) -> None:
     """Trial k of a plan is `auvsim dock --seed S --trial k` with what its variant pins."""
-    (tmp_path / "pins.yaml").write_text("estimator: {factory: imm}\nduration: 900.0\n")
+    (tmp_path / "pins.yaml").write_text("estimator: {kind: imm}\nduration: 900.0\n")
     found = plan.parse({"seed": 6, "trials": 9, "base": {"duration": 900.0}, "variants": VARIANTS})
     for trial in (0, 7):
         by_hand = options.scenario(tmp_path / "pins.yaml", None, {}, seed=6, trial=trial)
-        assert by_hand.model_dump(mode="json") == found.values("imm", trial)
+        assert scenario.parse(found.values("imm", trial)) == by_hand
 
 
 @pytest.mark.parametrize("kind", ["independent", "latin_hypercube", "sobol"])
@@ -38,7 +38,7 @@ def test_variants_see_the_same_draws(kind: str) -> None:
     assert trials[0] == trials[1]
     assert len({each["range"] for each in trials[0]}) == 8
     assert found.values("fast", 0)["guidance"]["approach_speed"] == 1.6
-    assert found.values("imm", 0)["estimator"]["factory"] == "imm"
+    assert found.values("imm", 0)["estimator"]["kind"] == "imm"
 
 
 def test_stratified_values_have_their_distributions() -> None:
@@ -79,7 +79,7 @@ def test_columns_are_what_differs() -> None:
     found = plan.parse({"variants": {**VARIANTS, "still": {"current": {"speed": 0.0}}}})
     assert "vehicle.start.range" in found.drawn
     assert "current.speed" in found.drawn  # of the other two
-    assert found.compared == ("guidance.approach_speed", "estimator.factory")
+    assert found.compared == ("guidance.approach_speed", "estimator.kind")
 
 
 def test_a_written_plan_is_the_same_plan(tmp_path: Path) -> None:
@@ -122,7 +122,11 @@ WRONG = {
     "base:\n  duration: {uniform: [9, 1]}": "wrong.yaml:2: duration: {uniform: [9, 1]}: low must not exceed high",
     "base:\n  dock: {choice: [{depth: 20}, {depth: {normal: [1]}}]}": "wrong.yaml:2: dock.depth: {normal: [1]}: needs",
     "base: nowhere.yaml": "nowhere.yaml: cannot be read",
-    "base:\n  manoeuvre: {kind: straight}": "wrong.yaml:2: manoeuvre: a campaign is of docking trials",
+    "success: docks": "wrong.yaml:1: success: no column that is true or false 'docks'; there are docked, docked_first",
+    "success: attempts": "wrong.yaml:1: success: no column that is true or false 'attempts'; there are docked",
+    "success: {metric: docked, below: 1}": "wrong.yaml:1: success: no column of numbers 'docked'; there are attempts",
+    "success: 5": "wrong.yaml:1: success: 5 should be a mapping",
+    "base:\n  mission: {kind: 'nowhere:Class'}": "wrong.yaml: mission 'nowhere:Class': ModuleNotFoundError",
     "sampling: halton": "wrong.yaml:1: sampling: halton should be 'independent', 'latin_hypercube' or 'sobol'",
     "stop: {width: 1.5}": "wrong.yaml:1: stop.width: 1.5 should be less than 1",
     "- 5": "wrong.yaml: a plan is a mapping",
@@ -148,7 +152,7 @@ def test_the_shipped_plan() -> None:
     found = plan.load("navigators")
     assert found.settings.trials == 200
     assert len(found.variants) == 3
-    assert len({found.values(name, 0)["estimator"]["factory"] for name in found.variants}) == 3
+    assert len({found.values(name, 0)["estimator"]["kind"] for name in found.variants}) == 3
     with pytest.raises(InputError, match=r"no plan 'navigator': .*shipped \(navigators\)"):
         plan.load("navigator")
 

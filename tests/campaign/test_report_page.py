@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from synthetic_campaign import TRIALS, VARIANTS, content, row, rows
 
+from auvsim.campaign.columns import layout
 from auvsim.campaign.report import cells, cost, misses
 from auvsim.campaign.report import html as page
 from auvsim.campaign.report.chart import Scale, interval_scale
@@ -121,6 +122,12 @@ def test_the_map_counts_what_docked(text: str) -> None:
         assert sums.tolist() == [2 * sum(r["docked"] for r in mine), 2 * TRIALS, 2 * first], index  # two frames
 
 
+def test_the_frame_of_the_dock_is_for_docking() -> None:
+    """A track's map has north up alone, whatever is drawn."""
+    assert cells.frames(content()) == ["compass", "dock"]
+    assert cells.frames(content(layout=layout(("track",)))) == ["compass"]
+
+
 def test_the_map_shows_first_what_tells_currents_apart(text: str) -> None:
     """Success where some failed; where all docked, the first attempt."""
     assert 'data-measure="docked"' in text
@@ -155,7 +162,8 @@ def test_headline_is_the_best_first_with_its_interval() -> None:
     for sentence, name in zip(headline(content()), VARIANTS, strict=True):
         docked = sum(r["docked"] for r in rows() if r["variant"] == name)
         rate = docked / TRIALS
-        low, high = sorted(np.roots([1.0 + z * z / TRIALS, -2.0 * rate - z * z / TRIALS, rate * rate]).real)
+        ends = np.roots([1.0 + z * z / TRIALS, -2.0 * rate - z * z / TRIALS, rate * rate]).real
+        low, high = sorted(np.round(ends, 12).tolist())  # a root at 1 is 1 but for rounding
         assert sentence.startswith(f"{name} docks in {docked} of {TRIALS} trials ({percent(low)} to {percent(high)} %)")
 
 
@@ -228,3 +236,17 @@ def test_scales_hold_their_values_between_round_ticks() -> None:
     assert decades(0.1) == pytest.approx(100.0)
     assert decades.ticks(8) == pytest.approx([0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0])
     assert decades.ticks(4) == pytest.approx([0.01, 0.1, 1.0])
+
+
+def test_trials_of_several_vehicles_count_once() -> None:
+    """In the map a trial is one, and a success if it is one for all of its vehicles; its cost counts once."""
+    several = layout(("docking",), True)
+    pairs = [{**each, "vehicle": name} for each in rows() for name in ("left", "right")]
+    for each in pairs:
+        each["docked"] = each["docked"] and (each["vehicle"] == "left" or each["trial"] != 3)
+    made = content(rows=pairs, layout=several)
+    mine = made.trials_of(VARIANTS[0])
+    assert [each["trial"] for each in mine] == list(range(TRIALS))
+    assert [each["trial"] for each in mine if not each["docked"]] == [3]
+    assert facts(made)["trials"] == "120 (2 × 60)"
+    assert re.findall(r"<td[^>]*>([^<]*)</td>", cost.section(made))[0] == "60"

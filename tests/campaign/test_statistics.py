@@ -1,20 +1,20 @@
 """What a campaign comes to: published intervals, coverage over many made-up campaigns, pairs by hand."""
 
-import math
-
 import numpy as np
 import pytest
 from scipy import stats
 
+from auvsim.analysis.statistics import wilson
 from auvsim.campaign import statistics
-from auvsim.campaign.statistics import MEANS, RATES
-from auvsim.campaign.table import COLUMNS, UNDER_WAY
+from auvsim.campaign.columns import layout
+
+LAYOUT = layout(("docking",))
 
 
 def row(variant: str, trial: int, **values: object) -> dict:
     """A row of the table, of a trial that raised an error but for what is given."""
     return {
-        **dict.fromkeys(COLUMNS),
+        **dict.fromkeys(LAYOUT.columns),
         "variant": variant,
         "trial": trial,
         "docked": False,
@@ -34,7 +34,7 @@ def test_interval_of_paired_rates_is_the_published_one(counts: tuple[int, ...], 
     """To the digits that are printed."""
     pairs = np.repeat([[1, 1], [1, 0], [0, 1], [0, 0]], counts, axis=0)
     rows = [row(name, k, docked=bool(pair[i])) for k, pair in enumerate(pairs) for i, name in enumerate(("b", "a"))]
-    found = next(d for d in statistics.differences(rows, ("a", "b")) if d.quantity == "docked")
+    found = next(d for d in statistics.differences(rows, ("a", "b"), LAYOUT) if d.quantity == "docked")
     assert (found.variant, found.pairs) == ("b", sum(counts))
     assert found.value == pytest.approx((counts[1] - counts[2]) / sum(counts))
     assert (found.low, found.high) == pytest.approx((low, high), abs=5e-5)
@@ -43,9 +43,9 @@ def test_interval_of_paired_rates_is_the_published_one(counts: tuple[int, ...], 
 def test_equal_pairs_are_not_certain() -> None:
     """200 of 200 against 200 of 200: about Wilson's own reach to either side, where a bootstrap would say none."""
     rows = [row(name, k, docked=True) for k in range(200) for name in ("a", "b")]
-    found = next(d for d in statistics.differences(rows, ("a", "b")) if d.quantity == "docked")
+    found = next(d for d in statistics.differences(rows, ("a", "b"), LAYOUT) if d.quantity == "docked")
     assert found.value == 0.0
-    reach = 1.0 - statistics.wilson(200, 200)[0]
+    reach = 1.0 - wilson(200, 200)[0]
     assert (found.low, found.high) == pytest.approx((-reach, reach))
 
 
@@ -54,37 +54,19 @@ def test_differences_are_of_pairs() -> None:
     misses = {"a": {0: 1.0, 1: 2.0, 2: 4.0, 5: 9.0}, "b": {0: 1.5, 1: 2.5, 2: 4.5, 3: None, 7: 70.0}}
     rows = [row(name, k, miss_distance=miss) for name, of in misses.items() for k, miss in of.items()]
     rows.append(row("a", 3, miss_distance=5.0))
-    found = {d.quantity: d for d in statistics.differences(rows, ("a", "b"))}
+    found = {d.quantity: d for d in statistics.differences(rows, ("a", "b"), LAYOUT)}
     assert set(found) == {"docked", "docked_first", "miss_distance"}
     less = found["miss_distance"]
     assert (less.value, less.low, less.high, less.pairs) == (0.5, 0.5, 0.5, 3)
     assert found["docked"].pairs == 4
-    assert statistics.differences(rows[:4], ("a",)) == []
-
-
-def test_bootstrap_covers_the_mean() -> None:
-    """95 % intervals of skewed samples of 60: the percentile method covers a little less than it says."""
-    generator = np.random.default_rng(3)
-    samples = generator.exponential(size=(300, 60))
-    inside = [low <= 1.0 <= high for low, high in map(statistics.bootstrap, samples)]
-    # 0.93 is what this method has at n = 60 for this law; four standard deviations of 300 trials.
-    assert np.mean(inside) == pytest.approx(0.93, abs=4 * math.sqrt(0.93 * 0.07 / 300))
-    assert statistics.bootstrap(samples[0]) == statistics.bootstrap(samples[0])
-
-
-def test_bootstrap_of_a_normal_mean() -> None:
-    """As wide as theory has it, within the noise of 10 000 resamples (1 % of the width) and of the sample's own."""
-    values = np.random.default_rng(4).normal(2.0, 3.0, size=400)
-    low, high = statistics.bootstrap(values)
-    reach = 1.96 * values.std() / math.sqrt(400)
-    assert (low, high) == pytest.approx((values.mean() - reach, values.mean() + reach), abs=0.05 * reach)
+    assert statistics.differences(rows[:4], ("a",), LAYOUT) == []
 
 
 def test_rates_are_wilsons() -> None:
     """Each variant and each success, against SciPy's own."""
     rows = [row("a", k, docked=k < 7, docked_first=k < 2) for k in range(10)] + [row("b", 0)]
-    found = {(r.variant, r.quantity): r for r in statistics.rates(rows, ("a", "b"))}
-    assert set(found) == {(name, quantity) for name in ("a", "b") for quantity in RATES}
+    found = {(r.variant, r.quantity): r for r in statistics.rates(rows, ("a", "b"), LAYOUT)}
+    assert set(found) == {(name, quantity) for name in ("a", "b") for quantity in LAYOUT.rates}
     for (variant, quantity), successes, trials in (
         (("a", "docked"), 7, 10),
         (("a", "docked_first"), 2, 10),
@@ -102,7 +84,7 @@ def test_consistency() -> None:
     nees = generator.chisquare(2, size=200) / 2.0  # one sample a trial, the worst case
     rows = [row("a", k, nees_per_dof=x, nees_per_dof_approach=x) for k, x in enumerate(nees)]
     rows += [row("b", k, nees_per_dof=4.0 * x) for k, x in enumerate(nees)] + [row("b", 200)]
-    found = {(n.variant, n.phase): n for n in statistics.consistency(rows, ("a", "b"))}
+    found = {(n.variant, n.phase): n for n in statistics.consistency(rows, ("a", "b"), LAYOUT)}
     assert set(found) == {("a", "all"), ("a", "approach"), ("b", "all")}
     assert found["a", "all"].holds
     assert not found["b", "all"].holds
@@ -113,4 +95,5 @@ def test_consistency() -> None:
 
 def test_what_is_compared_are_columns() -> None:
     """No quantity without a column."""
-    assert {*RATES, *MEANS, "nees_per_dof", *(f"nees_per_dof_{phase}" for phase in UNDER_WAY)} <= set(COLUMNS)
+    compared = {*LAYOUT.rates, *LAYOUT.means, *(f"nees_per_dof_{phase}" for phase in LAYOUT.phases)}
+    assert compared <= set(LAYOUT.columns)

@@ -10,6 +10,7 @@ import pytest
 from pyarrow import parquet
 
 from auvsim import cli
+from auvsim.analysis.summary import summarise
 from auvsim.base.errors import InputError
 from auvsim.campaign import execution, plan, table
 from auvsim.campaign.cluster import Cluster
@@ -17,9 +18,8 @@ from auvsim.campaign.folder import Folder
 from auvsim.campaign.local import Pool
 from auvsim.cli import products
 from auvsim.data import log
-from auvsim.missions.docking import metrics
 from auvsim.simulation import scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.simulation.run import run
 
 PLAN = {
     "name": "short",
@@ -28,7 +28,7 @@ PLAN = {
     "sampling": "sobol",
     "base": {"duration": 20.0},
     "keep": "failures",  # nobody docks in 20 s
-    "variants": {"plain": {}, "raises": {"estimator": {"factory": "campaign_estimators:raising"}}},
+    "variants": {"plain": {}, "raises": {"estimator": {"kind": "campaign_estimators:raising"}}},
 }
 
 
@@ -43,15 +43,15 @@ def test_a_trial_is_that_of_a_single_run(done: Folder) -> None:
     """Its log is the same bit for bit as in this process, and its row says what the log says."""
     rows = {(row["variant"], row["trial"]): row for row in table.rows(done)}
     for trial in (0, 1):
-        alone = run_trial(scenario.parse(done.plan.values("plain", trial)), seed=12, trial=trial)
+        alone = run(scenario.parse(done.plan.values("plain", trial)), seed=12, trial=trial)
         row = rows["plain", trial]
         kept = log.read(done.path / row["log"])
         assert log.differences(kept, alone) == []
-        summary = metrics.summarise(alone)
-        quality = summary.estimate["all"]
-        assert (row["docked"], row["failure"], row["attempts"]) == (False, "timeout", summary.attempts)
-        assert (row["position_rms"], row["samples"]) == (quality.position_rms, quality.samples)
-        assert row["fixes_sent"] == summary.fixes_sent
+        summary = summarise(alone.vehicle())
+        quality = summary["estimate"]["all"]
+        assert (row["docked"], row["failure"], row["attempts"]) == (False, "timeout", summary["attempts"])
+        assert (row["position_rms"], row["samples"]) == (quality["position_rms"], quality["samples"])
+        assert row["fixes_sent"] == summary["fixes_sent"]
         assert row["current.speed"] == done.plan.values("plain", trial)["current"]["speed"]
         assert row["real_time_factor"] == row["time"] / row["wall_time"]
     assert rows["plain", 0]["command"] == f"auvsim campaign {done.path} --trial 0 --variant plain"
@@ -66,7 +66,7 @@ def test_an_error_is_a_row(done: Folder) -> None:
         assert row["error_type"] == "FloatingPointError"
         assert row["error_message"] == row["failure_text"] == "lost at 5.5 s by <object object at 0x...>"
         assert "campaign_estimators.py" in row["traceback"]
-        assert row["estimator.factory"] == "campaign_estimators:raising"
+        assert row["estimator.kind"] == "campaign_estimators:raising"
         assert row["vehicle.start.range"] == done.plan.values("plain", row["trial"])["vehicle"]["start"]["range"]
         assert row["log"] is None
 
@@ -146,16 +146,14 @@ def test_one_trial_again(
 @pytest.mark.parametrize(
     ("pins", "text"),
     [
-        ({"estimator": {"factory": "kalman"}}, "variant 'b': no estimator 'kalman'; there are "),
-        ({"vehicle": {"model": "remus"}}, "variant 'b': no vehicle 'remus'; there are "),
-        ({"vehicle": {"start": {"depth": 100.0}}}, "variant 'b': start depth 100 m is not between"),
+        ({"estimator": {"kind": "no.where:factory"}}, "variant 'b': estimator 'no.where:factory': ModuleNotFound"),
+        ({"vehicle": {"model": "remus"}}, "no vehicle 'remus'; there are "),
+        ({"vehicle": {"start": {"depth": 100.0}}}, "variant 'b': vehicle 'remus100': start depth 100 m is not between"),
     ],
 )
 def test_what_cannot_be_set_up_is_refused_before_anything_runs(pins: dict, text: str, tmp_path: Path) -> None:
     """No trial has run then, and no folder is left."""
     from auvsim.campaign import trials
-
-    wrong = plan.parse({"trials": 2, "variants": {"a": {}, "b": pins}})
 
     class Here:
         name, jobs = "here", 1
@@ -165,7 +163,7 @@ def test_what_cannot_be_set_up_is_refused_before_anything_runs(pins: dict, text:
             yield from ((task, function(task)) for task in tasks)
 
     with pytest.raises(InputError, match=text):
-        execution.run(wrong, tmp_path / "c", Here())
+        execution.run(plan.parse({"trials": 2, "variants": {"a": {}, "b": pins}}), tmp_path / "c", Here())
     assert list(tmp_path.iterdir()) == []
 
 

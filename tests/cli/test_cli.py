@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from types import ModuleType, SimpleNamespace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -47,7 +47,13 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     class DrawingError(AuvsimError):
         pass
 
-    def run_trial(scenario, *, seed=0, trial=0, progress=None):
+    def run(scenario, *, seed=0, trial=0, progress=None, path=None):
+        log = made(scenario, seed, trial, progress)
+        if path is not None:
+            write(log, path)
+        return log
+
+    def made(scenario, seed, trial, progress):
         recorder.scenario, recorder.seed, recorder.trial = scenario, seed, trial
         recorder.durations.append(scenario.duration)
         if recorder.error:
@@ -58,8 +64,8 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
         if recorder.status == "diverged":
             log = writer()
             log.event(1.5, "diverged", "speed 1e+09 m/s at 1.5 s; use a smaller step")
-            return log.finish("diverged", wall_time=0.1)
-        return trial_log() if recorder.status == "complete" else empty_log(recorder.status)
+            return log.finish("diverged", wall_time=0.1).log
+        return (trial_log() if recorder.status == "complete" else empty_log(recorder.status)).log
 
     def picture(log, path):
         Path(path).write_bytes(b"picture")
@@ -72,16 +78,15 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
             progress(1, 2)
         Path(path).write_bytes(b"video")
 
-    fakes = {
-        "trial": {"run_trial": run_trial},
-        "plots": {"track": picture, "estimates": picture},
-        "video": {"render": render, "DrawingError": DrawingError},
-    }
-    for name, contents in fakes.items():
-        module = ModuleType(f"auvsim.{name}")
-        module.__dict__.update(contents)
-        monkeypatch.setitem(sys.modules, f"auvsim.{name}", module)
-        monkeypatch.setattr(auvsim, name, module, raising=False)
+    import auvsim.analysis.plots
+    import auvsim.simulation.run
+    import auvsim.video
+
+    monkeypatch.setattr(auvsim.simulation.run, "run", run)
+    monkeypatch.setattr(auvsim.analysis.plots, "track", picture)
+    monkeypatch.setattr(auvsim.analysis.plots, "estimates", picture)
+    monkeypatch.setattr(auvsim.video, "render", render)
+    monkeypatch.setattr(auvsim.video, "DrawingError", DrawingError)
     monkeypatch.setattr(fluid, "is_warm", lambda: True)
     return recorder
 
@@ -196,13 +201,14 @@ def test_files_and_options_pin(stand_in: Recorder, tmp_path: Path) -> None:
     arguments = "--current.speed 0.2 --vehicle.start.bearing-deg=-30 --sensors.usbl.jitter 0 --estimator a.b:c"
     assert cli.main(["dock", *arguments.split(), str(path), "--seed", "3", "--out", str(tmp_path / "out")]) == 0
     scenario, free = stand_in.scenario, parse(draw(default_plan(), 3))
-    assert scenario.current.model_dump() == {"kind": "uniform", "speed": 0.2, "direction_deg": 90.0, "down": 0.0}
+    assert scenario.water.current.model_dump() == {"kind": "uniform", "speed": 0.2, "direction_deg": 90.0, "down": 0.0}
     assert scenario.duration == 1000.0
-    assert scenario.vehicle.start.bearing_deg == -30.0
-    assert scenario.vehicle.start.range == free.vehicle.start.range
-    assert scenario.dock == free.dock
-    assert scenario.sensors.usbl.jitter == 0.0
-    assert scenario.estimator.factory == "a.b:c"
+    (_, vehicle), (_, unpinned) = scenario.lone, free.lone
+    assert vehicle.start.bearing_deg == -30.0
+    assert vehicle.start.range == unpinned.start.range
+    assert scenario.structures == free.structures
+    assert vehicle.sensors.usbl.jitter == 0.0
+    assert vehicle.estimator.kind == "a.b:c"
 
 
 def test_options_may_change_the_kind(stand_in: Recorder, tmp_path: Path) -> None:
@@ -215,7 +221,7 @@ def test_options_may_change_the_kind(stand_in: Recorder, tmp_path: Path) -> None
         ["--current", "{kind: gust, intensity: 0.2}"],
     ):
         assert cli.main(["dock", *arguments, *out]) == 0
-        assert stand_in.scenario.current.model_dump()["intensity"] == 0.2
+        assert stand_in.scenario.water.current.model_dump()["intensity"] == 0.2
     assert cli.main(["dock", "--duration.uniform", "[100, 101]", *out]) == 0
     assert 100.0 <= stand_in.scenario.duration <= 101.0
 
@@ -287,7 +293,7 @@ def test_unwritable_folder(stand_in: Recorder, where: str, tmp_path: Path, capsy
 )
 def test_made_again_from_the_log_alone(stand_in: Recorder, tmp_path: Path, command: str, made: set[str]) -> None:
     """Each command makes its files beside the log, given the file or its folder."""
-    write(trial_log(), tmp_path / "trial.nc")
+    write(trial_log().log, tmp_path / "trial.nc")
     assert cli.main([command, str(tmp_path / "trial.nc")]) == 0
     assert files(tmp_path) == {"trial.nc"} | made
     assert cli.main([command, str(tmp_path)]) == 0
@@ -298,7 +304,7 @@ def test_made_again_from_the_log_alone(stand_in: Recorder, tmp_path: Path, comma
 def test_truncated_log(tmp_path: Path, capsys: pytest.CaptureFixture, command: str) -> None:
     """Named, and nothing is made."""
     path = tmp_path / "trial.nc"
-    write(trial_log(), path)
+    write(trial_log().log, path)
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     assert str(path) in fails(capsys, command, path)

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from auvsim import cli
+from auvsim.analysis.summary import summarise
 from auvsim.data import log
 from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
@@ -30,13 +31,13 @@ def test_several_manoeuvres_in_one_call(tmp_path: Path, capsys: pytest.CaptureFi
     assert all(text in table for text in ("zigzag", "circle", "first overshoot [deg]", "advance [m]"))
     read = log.read(tmp_path / "zigzag.nc")
     assert read.attributes["status"] == "complete"
-    assert read["truth"]["time"][-1] == pytest.approx(60.0, abs=1e-9)
+    assert read.vehicle()["truth"]["time"][-1] == pytest.approx(60.0, abs=1e-9)
     (tmp_path / "circle.png").unlink()
     assert cli.main(["plot", str(tmp_path / "circle.nc")]) == 0
     assert cli.main(["metrics", str(tmp_path / "zigzag.nc")]) == 0
     assert files(tmp_path) == {"zigzag.nc", "zigzag.png", "circle.nc", "circle.png", "summary.json"}
     summary = json.loads((tmp_path / "summary.json").read_text())
-    assert summary == manoeuvre_metrics.summary(read)
+    assert summary == summarise(read.vehicle())
     assert summary["manoeuvres"][0]["first_overshoot_deg"] > 0.0
 
 
@@ -47,7 +48,7 @@ def test_an_optimal_manoeuvre_is_designed_and_run(tmp_path: Path, capsys: pytest
     assert files(tmp_path) == {"optimal.nc", "optimal.png"}
     table = capsys.readouterr().out
     assert all(text in table for text in ("log det", "N_uv", "largest rudder [deg]"))
-    trial = log.read(tmp_path / "optimal.nc")
+    trial = log.read(tmp_path / "optimal.nc").vehicle()
     (figures,) = manoeuvre_metrics.figures(trial)
     assert figures.kind == "optimal"
     room = figures.numbers["room"]
@@ -63,14 +64,13 @@ def test_a_file_pins_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     path = tmp_path / "mine.yaml"
     path.write_text("current: {kind: none}\nmanoeuvre: {kind: zigzag, heading_deg: 15.0, rudder_deg: 5.0}\n")
     plans = command.plans(["zigzag", str(path), "circle"], {"manoeuvre": {"approach": 5.0}}, seed=0, trial=0)
-    zigzag, circle = plans["zigzag"].manoeuvre, plans["circle"].manoeuvre
-    assert zigzag is not None
-    assert circle is not None
+    zigzag, circle = (plans[kind].lone[1].mission.manoeuvre for kind in ("zigzag", "circle"))
     assert zigzag.model_dump() | {"heading_deg": 15.0, "rudder_deg": 5.0, "approach": 5.0} == zigzag.model_dump()
     assert (circle.kind, circle.duration) == ("circle", 300.0)
-    assert plans["circle"].current.kind == "none"
-    assert plans["zigzag"].sensors.dvl.enabled
-    assert plans["zigzag"].sensors.gyro.enabled
+    assert plans["circle"].water.current.kind == "none"
+    sensors = plans["zigzag"].lone[1].sensors
+    assert sensors.dvl.enabled
+    assert sensors.gyro.enabled
 
 
 @pytest.mark.parametrize(
@@ -112,8 +112,11 @@ def test_dock_refuses_a_manoeuvre(tmp_path: Path, capsys: pytest.CaptureFixture)
     assert not (tmp_path / "out").exists()
 
 
-def test_divergence_is_diagnosed(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+def test_divergence_is_diagnosed(
+    tmp_path: Path, capsys: pytest.CaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """A physics step of half a second diverges: exit code 1, the log up to there, no picture."""
+    monkeypatch.setattr("auvsim.simulation.run.check_steps", lambda scenario: None)  # would refuse it
     names = ("compass", "depth", "feedback", "dvl", "gyro")
     sensors = [part for name in names for part in (f"--sensors.{name}.rate", "2")]
     assert manoeuvre(tmp_path, "circle", "--rates.physics", 2, "--rates.control", 2, "--rates.log", 2, *sensors) == 1

@@ -9,13 +9,15 @@ import pytest
 from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.randomness import stream
 from auvsim.base.reading import Reading
-from auvsim.control.torpedo import Autopilot, ControlSettings
-from auvsim.physics import planar_fit
-from auvsim.physics.truth import DockPose
-from auvsim.physics.world import World, WorldSettings
+from auvsim.control.controller import ControllerSetup, Setpoints
+from auvsim.control.torpedo import Autopilot, AutopilotSettings
+from auvsim.physics import planar_fit, scenes
+from auvsim.physics.scenes import WorldSettings
+from auvsim.physics.world import World
 from auvsim.sensors.compass import Compass, CompassSettings
 from auvsim.sensors.depth import Depth, DepthSettings
 from auvsim.vehicles import library
+from auvsim.vehicles.actuation import FinsAndShaft
 from auvsim.water.currents import Uniform
 
 PERIOD = 0.1  # of control [s]
@@ -23,9 +25,19 @@ FIN_LIMIT, SHAFT_LIMIT = 0.26, 160.0  # [rad], [rad/s]
 QUIET = (CompassSettings(heading_noise_deg=0, heading_bias_deg=0, tilt_noise_deg=0), DepthSettings(noise=0, bias=0))
 
 
+def setup(settings: AutopilotSettings) -> ControllerSetup:
+    """Two pairs of fins and a shaft."""
+    limits = np.array([[-FIN_LIMIT, FIN_LIMIT]] * 4 + [[-SHAFT_LIMIT, SHAFT_LIMIT]])
+    matrix = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
+    actuation = FinsAndShaft(fins=("a", "b", "c", "d"), matrix=matrix, limits=limits, lags=np.zeros(5))
+    return ControllerSetup(
+        settings=settings, actuation=actuation, shaft_speed=lambda speed: 80.0 * speed, period=PERIOD
+    )
+
+
 def autopilot(heading=0.0, depth=10.0, pitch=0.0, yaw_rate=0.0, settings=None) -> Autopilot:
     """An autopilot that has seen ten seconds of steady readings up to time 0."""
-    pilot = Autopilot(settings or ControlSettings(), lambda speed: 80.0 * speed, FIN_LIMIT, SHAFT_LIMIT, PERIOD)
+    pilot = Autopilot(setup(settings or AutopilotSettings()))
     for time in np.arange(-10.0, PERIOD / 2, PERIOD).tolist():
         compass = np.array([wrap(heading + yaw_rate * time), pitch, 0.0])
         pilot.observe([Reading("compass", time, time, compass), Reading("depth", time, time, np.array([depth]))])
@@ -38,8 +50,8 @@ def autopilot(heading=0.0, depth=10.0, pitch=0.0, yaw_rate=0.0, settings=None) -
 )
 def test_rudder_turns_the_short_way(measured: float, wanted: float, sign: int) -> None:
     """A wanted heading to starboard gives positive rudder, in proportion, also across 180 degrees."""
-    rudder = autopilot(heading=measured).command(wanted, 10.0, 1.0).rudder
-    assert rudder == pytest.approx(ControlSettings().heading_gain * wrap(wanted - measured), abs=1e-9)
+    rudder = autopilot(heading=measured).command(Setpoints(wanted, 10.0, 1.0)).rudder
+    assert rudder == pytest.approx(AutopilotSettings().heading_gain * wrap(wanted - measured), abs=1e-9)
     assert sign == 0 or rudder * sign > 0.0
 
 
@@ -47,72 +59,76 @@ def test_rudder_damps_the_turn() -> None:
     """On the wanted heading but still turning to starboard: rudder to port."""
     rate = 0.02
     pilot = autopilot(heading=3.14, yaw_rate=rate)  # passing 180 degrees within the ten seconds
-    assert pilot.command(3.14, 10.0, 1.0).rudder == pytest.approx(-ControlSettings().yaw_rate_gain * rate, rel=0.02)
+    assert pilot.command(Setpoints(3.14, 10.0, 1.0)).rudder == pytest.approx(
+        -AutopilotSettings().yaw_rate_gain * rate, rel=0.02
+    )
 
 
 @pytest.mark.parametrize(("depth", "sign"), [(10.5, 1), (9.5, -1)])
 def test_stern_plane_dives_when_too_shallow(depth: float, sign: int) -> None:
     """Too shallow: positive stern plane (dives); the commanded pitch is nose down, in proportion."""
-    elevator = autopilot(depth=10.0).command(0.0, depth, 1.0).elevator
-    s = ControlSettings()
+    elevator = autopilot(depth=10.0).command(Setpoints(0.0, depth, 1.0)).elevator
+    s = AutopilotSettings()
     assert elevator == pytest.approx(s.pitch_gain * s.depth_gain * (depth - 10.0))
     assert elevator * sign > 0.0
 
 
 def test_stern_plane_stops_at_the_wanted_pitch() -> None:
     """The pitch that the depth error asks for is held with the planes amidships; more pitch than that is taken off."""
-    wanted = -ControlSettings().depth_gain * 1.0
-    assert autopilot(pitch=wanted).command(0.0, 11.0, 1.0).elevator == pytest.approx(0.0, abs=1e-9)
-    assert autopilot(pitch=wanted - 0.05).command(0.0, 11.0, 1.0).elevator < 0.0
+    wanted = -AutopilotSettings().depth_gain * 1.0
+    assert autopilot(pitch=wanted).command(Setpoints(0.0, 11.0, 1.0)).elevator == pytest.approx(0.0, abs=1e-9)
+    assert autopilot(pitch=wanted - 0.05).command(Setpoints(0.0, 11.0, 1.0)).elevator < 0.0
 
 
 def test_pitch_command_is_limited() -> None:
     """However far the depth: at the limit of pitch the planes are amidships."""
-    limit = math.radians(ControlSettings().pitch_limit_deg)
-    assert autopilot(pitch=-limit).command(0.0, 500.0, 1.0).elevator == pytest.approx(0.0, abs=1e-9)
-    assert autopilot(pitch=limit).command(0.0, -500.0, 1.0).elevator == pytest.approx(0.0, abs=1e-9)
+    limit = math.radians(AutopilotSettings().pitch_limit_deg)
+    assert autopilot(pitch=-limit).command(Setpoints(0.0, 500.0, 1.0)).elevator == pytest.approx(0.0, abs=1e-9)
+    assert autopilot(pitch=limit).command(Setpoints(0.0, -500.0, 1.0)).elevator == pytest.approx(0.0, abs=1e-9)
 
 
 def test_actuators_are_limited() -> None:
     """Rudder, stern plane and shaft at their limits, of either sign."""
-    assert autopilot(pitch=0.5).command(2.0, 50.0, 9.0) == (FIN_LIMIT, FIN_LIMIT, SHAFT_LIMIT)
-    assert autopilot(pitch=-0.5).command(-2.0, 0.0, -9.0) == (FIN_LIMIT, FIN_LIMIT, -SHAFT_LIMIT)
+    assert autopilot(pitch=0.5).command(Setpoints(2.0, 50.0, 9.0)) == (FIN_LIMIT, FIN_LIMIT, SHAFT_LIMIT)
+    assert autopilot(pitch=-0.5).command(Setpoints(-2.0, 0.0, -9.0)) == (FIN_LIMIT, FIN_LIMIT, -SHAFT_LIMIT)
 
 
 def test_astern_the_fins_act_the_other_way() -> None:
     """Flow from astern turns the sign of every fin, once the way ahead is off; the shaft turns back as fast."""
-    pilot = autopilot(settings=ControlSettings(depth_integral_gain=0.0))
-    ahead = pilot.command(0.01, 10.1, 1.0)
-    still_ahead = pilot.command(0.01, 10.1, -1.0)
+    pilot = autopilot(settings=AutopilotSettings(depth_integral_gain=0.0))
+    ahead = pilot.command(Setpoints(0.01, 10.1, 1.0))
+    still_ahead = pilot.command(Setpoints(0.01, 10.1, -1.0))
     assert still_ahead.rudder == pytest.approx(ahead.rudder)
     for _ in range(100):
-        astern = pilot.command(0.01, 10.1, -1.0)
-    assert astern.rudder == pytest.approx(-ControlSettings().astern_factor * ahead.rudder)
+        astern = pilot.command(Setpoints(0.01, 10.1, -1.0))
+    assert astern.rudder == pytest.approx(-AutopilotSettings().astern_factor * ahead.rudder)
     assert astern.elevator == pytest.approx(-ahead.elevator)
     assert astern.shaft_speed == -ahead.shaft_speed
-    assert autopilot().command(0.0, 10.0, 0.0).shaft_speed == 0.0
+    assert autopilot().command(Setpoints(0.0, 10.0, 0.0)).shaft_speed == 0.0
 
 
 def test_waits_for_its_first_readings() -> None:
     """Fins amidships until both compass and gauge have spoken; other sensors are none of its business."""
-    pilot = Autopilot(ControlSettings(), lambda speed: 80.0 * speed, FIN_LIMIT, SHAFT_LIMIT, PERIOD)
+    pilot = Autopilot(setup(AutopilotSettings()))
     pilot.observe([Reading("feedback", 0.0, 0.0, np.ones(5)), Reading("compass", 0.0, 0.0, np.zeros(3))])
-    assert pilot.command(1.0, 20.0, 1.0) == (0.0, 0.0, 80.0)
+    assert pilot.command(Setpoints(1.0, 20.0, 1.0)) == (0.0, 0.0, 80.0)
     assert pilot.depth is None
     pilot.observe([Reading("depth", 0.0, 0.0, np.array([3.0]))])
     assert (pilot.heading, pilot.depth) == (0.0, 3.0)
-    assert pilot.command(1.0, 20.0, 1.0).rudder > 0.0
+    assert pilot.command(Setpoints(1.0, 20.0, 1.0)).rudder > 0.0
 
 
 def test_integral_waits_while_far_off() -> None:
     """A long dive winds nothing up; a small standing error is integrated."""
     far, near, fresh = autopilot(), autopilot(), autopilot()
     for _ in range(600):
-        far.command(0.0, 30.0, 1.0)
-        near.command(0.0, 10.2, 1.0)
-    s = ControlSettings()
-    assert far.command(0.0, 10.0, 1.0) == fresh.command(0.0, 10.0, 1.0)
-    assert near.command(0.0, 10.0, 1.0).elevator == pytest.approx(s.pitch_gain * s.depth_integral_gain * 0.2 * 60.0)
+        far.command(Setpoints(0.0, 30.0, 1.0))
+        near.command(Setpoints(0.0, 10.2, 1.0))
+    s = AutopilotSettings()
+    assert far.command(Setpoints(0.0, 10.0, 1.0)) == fresh.command(Setpoints(0.0, 10.0, 1.0))
+    assert near.command(Setpoints(0.0, 10.0, 1.0)).elevator == pytest.approx(
+        s.pitch_gain * s.depth_integral_gain * 0.2 * 60.0
+    )
 
 
 @dataclass
@@ -129,22 +145,24 @@ class Sailed:
 def sail(
     duration, heading=0.0, depth=20.0, speed=1.0, current=(0.0, 0.0, 0.0), sensors=QUIET, astern_after=math.inf, seed=5
 ) -> Sailed:
-    """The REMUS 100 under the autopilot, from 300 m beside the dock, 20 m deep, heading north."""
-    vehicle, dock = library.vehicle("remus100"), library.dock("dock")
-    pose = DockPose(depth=20.0, heading=0.0)
-    world = World.build(vehicle, dock, pose, Uniform(current), WorldSettings(sea_floor=80.0), 100.0)
-    believed = planar_fit.fit_planar_model("remus100", 1.0)
-    limits = (vehicle.allocation.limit, vehicle.shaft_limit)
-    pilot = Autopilot(ControlSettings(), believed.shaft_speed_for, *limits, PERIOD)
+    """The REMUS 100 under the autopilot, 20 m deep, heading north."""
+    vehicle = library.vehicle("remus100")
+    world = World(scenes.scene({"auv": "remus100"}, {}, WorldSettings(sea_floor=80.0), 100.0), Uniform(current))
+    fitted = planar_fit.fit_planar_model("remus100", 1.0)
+    made = ControllerSetup(
+        settings=AutopilotSettings(), actuation=vehicle.actuation, shaft_speed=fitted.shaft_speed_for, period=PERIOD
+    )
+    pilot = Autopilot(made)
     compass, gauge = Compass(sensors[0], stream(seed, 0, "compass")), Depth(sensors[1], stream(seed, 0, "depth"))
-    world.place(np.array([0.0, -300.0, 20.0]), 0.0, speed, believed.shaft_speed_for(speed))
+    channels = vehicle.actuation.allocate(vehicle.actuation.at_speed(fitted.shaft_speed_for(speed)))
+    world.place("auv", np.array([0.0, -300.0, 20.0]), 0.0, speed, channels)
     rows = []
     for _ in range(round(duration / PERIOD)):
         world.advance(10)
-        truth = world.truth()
-        pilot.observe([compass.measure(truth), gauge.measure(truth)])
-        commands = pilot.command(heading, depth, -0.8 if truth.time > astern_after else speed)
-        world.command(*commands)
+        truth = world.truth("auv")
+        pilot.observe([compass.measure(truth, world), gauge.measure(truth, world)])
+        commands = pilot.command(Setpoints(heading, depth, -0.8 if truth.time > astern_after else speed))
+        world.command("auv", vehicle.actuation.allocate(commands))
         water = truth.nu[:3] - rotation(*truth.attitude).T @ truth.current
         rows.append((truth.time, *truth.position, truth.attitude[2], *water, commands.rudder))
     columns = np.array(rows).T
@@ -222,4 +240,4 @@ def test_backs_out() -> None:
 def test_noise_moves_the_rudder_little() -> None:
     """With the compass's 1 degree of white noise on a straight course the rudder works within a third of its limit."""
     rudder = sail(60.0, sensors=(CompassSettings(), DepthSettings())).rudder[100:]
-    assert 0.0 < np.sqrt(np.mean(rudder**2)) < library.vehicle("remus100").allocation.limit / 3.0
+    assert 0.0 < np.sqrt(np.mean(rudder**2)) < library.vehicle("remus100").actuation.fin_limit / 3.0

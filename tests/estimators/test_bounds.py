@@ -7,13 +7,13 @@ from estimators.core import ekf
 from estimators.core.bounds import PosteriorBound, inverse
 from estimators.core.errors import NotPositiveDefiniteError
 from estimators.core.history import History
-from estimators.core.types import Gaussian, Measurement
+from estimators.core.types import Gaussian, Measurement, MeasurementModel, ProcessModel
 
 P0 = np.diag([1.0, 0.5])
 Q = np.array([[0.02, 0.01], [0.01, 0.05]])
 
 
-class Linear:
+class Linear(ProcessModel):
     A = np.array([[1.0, 0.5], [0.0, 0.9]])
 
     def evaluate(self, x, u, dt):
@@ -36,7 +36,7 @@ class Growth(Linear):
         return np.array([[0.1]])
 
 
-class First:
+class First(MeasurementModel):
     def __init__(self, slope):
         self.jacobian = slope
 
@@ -57,7 +57,7 @@ def bound_history(process, model, truths, prior):
 
 def test_linear_bound_is_the_kalman_covariance():
     H = np.array([[1.0, 0.0]])
-    history = bound_history(Linear(), First(lambda x: H), lambda time: np.zeros((3, 2)), P0)
+    history = bound_history(Linear(), First(lambda x, m: H), lambda time: np.zeros((3, 2)), P0)
     belief = Gaussian(mean=np.zeros(2), covariance=P0)
     for k in range(20):
         history.append(0.5 * k, (), [seen(0.5 * k)])
@@ -73,7 +73,7 @@ def test_nonlinear_bound_is_tichavskys():
     rng = np.random.default_rng(0)
     paths = rng.standard_normal((50, 11, 1)).cumsum(axis=1)
     history = bound_history(
-        Growth(), First(lambda x: np.array([[x[0]]])), lambda time: paths[:, round(time / 0.5)], np.eye(1)
+        Growth(), First(lambda x, m: np.array([[x[0]]])), lambda time: paths[:, round(time / 0.5)], np.eye(1)
     )
     J = 1.0
     for k in range(11):
@@ -89,7 +89,7 @@ def test_nonlinear_bound_is_tichavskys():
 
 def test_a_late_measurement_counts_from_its_arrival():
     H = np.array([[1.0, 0.0]])
-    prompt, late = (bound_history(Linear(), First(lambda x: H), lambda time: np.zeros((1, 2)), P0) for _ in range(2))
+    prompt, late = (bound_history(Linear(), First(lambda x, m: H), lambda time: np.zeros((1, 2)), P0) for _ in range(2))
     for k in range(6):
         for history in (prompt, late):
             history.append(0.5 * k, (), [seen(0.0)] if k == 0 else [])

@@ -9,7 +9,7 @@ from estimators.core import loops
 from estimators.core.consistency import chi_square
 from estimators.core.ekf import correct, correct_angle, correct_linear, predict
 from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError
-from estimators.core.types import Gaussian, Measurement
+from estimators.core.types import Gaussian, Measurement, ProcessModel
 from estimators.docking.models import HeadingModel, PositionModel
 from estimators.planar.model import PRESTERO, PlanarProcess
 
@@ -28,7 +28,7 @@ def measurement(value, variance, kind="usbl"):
     )
 
 
-class Constant:
+class Constant(ProcessModel):
     """A user's own process: x' = A x + B u."""
 
     A = np.array([[1.0, 0.5], [0.0, 0.9]])
@@ -95,7 +95,7 @@ def test_own_process_by_the_generic_path():
 def test_generic_path_equals_the_compiled_one():
     process = PlanarProcess(PRESTERO, np.full(8, 1e-3))
 
-    class Uncompiled:
+    class Uncompiled(ProcessModel):
         evaluate, jacobian, covariance = process.evaluate, process.jacobian, process.covariance
 
     before = belief(6)
@@ -122,8 +122,9 @@ def test_an_angle_at_once_is_the_angle_by_the_long_way(heading):
     before = belief(10)
     for value in (-3.1, 0.0, 3.1):
         sample = measurement(value, 0.1, "compass")
-        after = correct_angle(before, heading.jacobian(before.mean), sample.value, sample.covariance)
-        expected, _ = correct(before, sample, heading)
+        after, nis = correct_angle(before, heading.jacobian(before.mean), sample.value, sample.covariance)
+        expected, innovation = correct(before, sample, heading)
+        assert nis == innovation.nis
         assert (after.mean == expected.mean).all()
         assert (after.covariance == expected.covariance).all()
 

@@ -140,6 +140,19 @@ def test_nodes_leave_by_age_and_the_state_is_that_of_a_history_that_keeps_all():
     assert len(long.nodes) > 100
 
 
+def test_a_tick_that_a_measurement_of_the_greatest_age_still_belongs_to_keeps_its_base():
+    """The tick at 0.46 s is within a tenth of a step of the stamp that is just 2 s old: it is not the oldest."""
+    short, long = History(Recorder(), step=0.5, keep=2.0), History(Recorder(), step=0.5, keep=1000.0)
+    for history in (short, long):
+        for k, time in enumerate((0.0, 0.46, 1.0, 1.5, 2.0, 2.5)):
+            history.append(time, (float(k),), [fix(0.0)] if k == 0 else ())
+            history.replay()
+        assert history.insert(fix(0.5))
+        history.replay()
+    assert short.state == long.state
+    assert short.state[2] == ("correct", 0.46, ("fix", 0.5))
+
+
 def test_rarely_replayed_history_forgets_nothing():
     short, long = History(Recorder(), step=0.5, keep=3.0), History(Recorder(), step=0.5, keep=1000.0)
     for k in range(50):

@@ -195,7 +195,9 @@ def test_modes_change_with_time_and_not_with_the_number_of_fixes(interval):
 
 
 def rejected(stamp, north, east):
-    return Rejected(stamp, np.array([north, east]), np.eye(2, 8), 0.0046 * np.eye(2))
+    residual = np.array([north, east])
+    fix = Measurement(kind=USBL, value=residual, covariance=0.0046 * np.eye(2), stamp=stamp, received=stamp)
+    return Rejected(fix, residual, np.eye(2, 8))
 
 
 def test_two_fixes_agree_within_reach_of_a_current_and_three_only_along_one():

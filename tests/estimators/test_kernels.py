@@ -77,7 +77,7 @@ def test_without_a_writable_folder_the_source_is_kept_in_memory(monkeypatch, tmp
 def test_processes_share_the_cache(tmp_path):
     """Three processes at once on an empty cache, then a fourth that finds it warm."""
     code = (
-        "import time\nfrom estimators import planar_model as m\n"
+        "import time\nfrom estimators.planar import model as m\n"
         "was = m.is_warm()\nstart = time.perf_counter()\nm.warm()\n"
         "print(was, m.is_warm(), time.perf_counter() - start)"
     )

@@ -14,7 +14,7 @@ from estimators.core.consistency import interval, nees
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.history import History
 from estimators.core.smoothing import smooth
-from estimators.core.types import Gaussian, Measurement
+from estimators.core.types import Gaussian, Measurement, MeasurementModel, ProcessModel
 from estimators.docking.estimator import (
     REFERENCE_NOISE,
     AugmentedFilter,
@@ -28,7 +28,7 @@ A, Q, R, H = np.array([[1.0, 0.5], [0.0, 0.9]]), np.array([[0.02, 0.01], [0.01, 
 P0 = np.diag([1.0, 0.5])
 
 
-class Linear:
+class Linear(ProcessModel):
     def evaluate(self, x, u, dt):
         return A @ x
 
@@ -39,13 +39,13 @@ class Linear:
         return Q
 
 
-class First:
+class First(MeasurementModel):
     """y = x_0."""
 
-    def evaluate(self, x):
+    def evaluate(self, x, measurement=None):
         return x[:1]
 
-    def jacobian(self, x):
+    def jacobian(self, x, measurement=None):
         return H
 
     def covariance(self, x, measurement):
@@ -149,8 +149,10 @@ def test_the_newest_pose_is_the_filters():
 
 
 def test_the_papers_filter_cannot_be_smoothed():
+    run, estimator = simulate(Conditions(duration=20.0), 1), DockingEstimator(PaperFilter(PRESTERO))
+    list(follow(run, estimator))
     with pytest.raises(ParameterError, match="cannot be smoothed"):
-        DockingEstimator(PaperFilter(PRESTERO)).smoothed()
+        estimator.smoothed()
 
 
 def causal_ratios(seeds, times):

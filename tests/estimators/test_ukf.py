@@ -8,13 +8,13 @@ from test_ekf import Constant, belief, measurement
 
 from estimators.core import ekf, ukf
 from estimators.core.errors import NotPositiveDefiniteError, ParameterError
-from estimators.core.types import Gaussian
+from estimators.core.types import Gaussian, MeasurementModel
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.models import HeadingModel, PositionModel
 from estimators.planar.model import PRESTERO, PlanarProcess
 
 
-class Unmarked:
+class Unmarked(MeasurementModel):
     """A sensor that does not say whether it is linear."""
 
     def __init__(self, model):
@@ -22,10 +22,10 @@ class Unmarked:
         self.covariance, self.residual = model.covariance, model.residual
 
 
-class Range:
+class Range(MeasurementModel):
     """Distance and bearing of the origin, the textbook's nonlinear sensor."""
 
-    def evaluate(self, x):
+    def evaluate(self, x, measurement=None):
         return np.array([math.hypot(x[0], x[1]), math.atan2(x[1], x[0])])
 
     def covariance(self, x, measurement):
@@ -81,7 +81,7 @@ def test_correction_by_a_curved_sensor_has_the_transform_s_covariance():
     seen = measurement([10.2, 0.2], 0.01)
     after, innovation = ukf.correct(Gaussian(mean=mean, covariance=P), seen, Range())
     points, weights = ukf.sigma_points(Gaussian(mean=mean, covariance=P))
-    values = np.array([Range().evaluate(x) for x in points])
+    values = np.array([Range().evaluate(x, None) for x in points])
     spread, deviations = values - weights @ values, points - mean
     S, cross = (weights * spread.T) @ spread + seen.covariance, (weights * deviations.T) @ spread
     K = cross @ np.linalg.inv(S)

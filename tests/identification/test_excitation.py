@@ -88,9 +88,9 @@ def test_information_against_finite_differences(bench: Bench) -> None:
     rates = [10.0, 5.0, 5.0, 10.0, 5.0, 5.0]
     weights = np.sqrt(STEP * np.array(rates)) / noises
     J = (columns * weights).reshape(k + 10, -1).T
-    believed = [1.0, 1.0, 1.0, 0.3, 1.0, 1.0, sensors.gyro.bias_deg * DEG, 0.5 * DEG, 0.3 * DEG, 0.002]
+    prior = [1.0, 1.0, 1.0, 0.3, 1.0, 1.0, sensors.gyro.bias_deg * DEG, 0.5 * DEG, 0.3 * DEG, 0.002]
     whole = J.T @ J
-    rest = whole[k:, k:] + np.diag(np.array(believed) ** -2.0)
+    rest = whole[k:, k:] + np.diag(np.array(prior) ** -2.0)
     expected = whole[:k, :k] - whole[:k, k:] @ np.linalg.solve(rest, whole[k:, :k]) + np.eye(k)
     found = experiment.information(experiment.run(experiment.start(1.5), inputs))
     # Differences of 1e-4 are good to 1e-8 of the second derivative and 1e-11 of rounding; the elimination takes away

@@ -35,35 +35,44 @@ def shown(x):
 
 
 def test_likelihood_equals_that_of_a_filter_written_anew():
-    """Sample by sample, all channels at once, derivatives by differences, and matrices inverted."""
+    """One scalar after the other, derivatives by differences of what channels show, covariances in Joseph's form."""
     run = noisy(1, 10.0)
     q = np.concatenate([DENSITIES, np.zeros(6)])
     x, P = first_belief(run.record, PARAMETERS, SHEETS.vector())
     process, cost = PlanarProcess(PARAMETERS, q[:8]), 0.0
-    R = np.diag(run.record.deviations**2)
+    variances = run.record.deviations**2
     e, s = np.empty((100, 8)), np.empty((100, 8))
-    loops = compiled.filters()
-    found = loops.track(
-        x.copy(), P.copy(), run.record.inputs, run.record.measured, run.record.deviations**2, PARAMETERS.vector(), q,
-        0.1, 1, e, s,
-    )  # fmt: skip
+    found = compiled.filters().track(
+        x.copy(), P.copy(), run.record.inputs, run.record.measured, variances, PARAMETERS.vector(), q, 0.1, 1, e, s
+    )
     for given, measured in zip(run.record.inputs, run.record.measured, strict=True):
-        here = np.flatnonzero(np.isfinite(measured))
-        H = np.column_stack([(shown(x + d) - shown(x - d)) / 2e-5 for d in 1e-5 * np.eye(12)])[here]
-        S = H @ P @ H.T + R[np.ix_(here, here)]
-        innovation = measured[here] - shown(x)[here]
-        innovation[here == 2] = np.angle(np.exp(1j * innovation[here == 2]))
-        K = P @ H.T @ np.linalg.inv(S)
-        cost += 0.5 * (innovation @ np.linalg.solve(S, innovation) + np.linalg.slogdet(S)[1])
-        x, P = x + K @ innovation, (np.eye(12) - K @ H) @ P
+        for c in np.flatnonzero(np.isfinite(measured)):
+            H = np.array([(shown(x + d)[c] - shown(x - d)[c]) / 2e-5 for d in 1e-5 * np.eye(12)])
+            innovation = measured[c] - shown(x)[c]
+            innovation = np.angle(np.exp(1j * innovation)) if c == 2 else innovation
+            variance = H @ P @ H + variances[c]
+            cost += 0.5 * (innovation**2 / variance + math.log(variance))
+            K = P @ H / variance
+            x, left = x + K * innovation, np.eye(12) - np.outer(K, H)
+            P = left @ P @ left.T + variances[c] * np.outer(K, K)
         F = np.eye(12)
         F[:8, :8] = process.jacobian(x[:8], given, 0.1)
         x = np.concatenate([process.evaluate(x[:8], given, 0.1), x[8:]])
         P = F @ P @ F.T + 0.05 * (F @ np.diag(q) @ F.T + np.diag(q))
-    # One scalar after the other linearises the logs anew in between: a second-order difference, some 1e-3 of the first
-    # samples' innovations, which are of order 1.
-    assert found == pytest.approx(cost, abs=0.5)
+    # Central differences of 1e-5 are right to 1e-10 of what they differentiate; innovations are of order 1.
+    assert found == pytest.approx(cost, abs=1e-5)
     assert np.isfinite(e).sum() == np.isfinite(run.record.measured).sum()
+
+
+@pytest.mark.parametrize("channel", range(8))
+def test_what_a_channel_shows_and_its_derivatives(channel):
+    """Derivatives against central differences of `shown`, at states with drift, current and constant errors."""
+    generator, H = np.random.default_rng(channel), np.empty(12)
+    for _ in range(20):
+        x = generator.normal(0.0, [50, 50, 2, 1, 0.3, 0.2, 0.4, 0.4, 0.01, 0.05, 0.05, 0.02])
+        assert compiled.filters().row_of(x, channel, H) == pytest.approx(shown(x)[channel], abs=1e-12)
+        differences = [(shown(x + d)[channel] - shown(x - d)[channel]) / 2e-6 for d in 1e-6 * np.eye(12)]
+        np.testing.assert_allclose(H, differences, atol=1e-7)  # rounding of 100 m in a step of 1e-6
 
 
 def test_gradient_equals_differences_of_the_likelihood():
@@ -153,6 +162,41 @@ def test_smoother_follows_the_truth():
     errors = np.sqrt(np.mean((way[:, 2:6] - run.states[:, 2:6]) ** 2, axis=0))
     # Heading within the compass's bias; velocities within a log's reading, the yaw rate within a few of the gyro's.
     assert (errors < [0.03, 0.02, 0.02, 0.005]).all()
+
+
+def test_smoother_is_that_of_each_sample_whatever_its_substeps():
+    """Gains of Rauch, Tung and Striebel from the derivative of a whole sample of three substeps, by differences."""
+    run, parts, count = noisy(9, 4.0), 3, 12
+    q = np.concatenate([DENSITIES, np.zeros(6)])
+    x, P = first_belief(run.record, PARAMETERS, SHEETS.vector())
+    loops, process = compiled.filters(), PlanarProcess(PARAMETERS, q[:8])
+    step = 0.48  # of a sample [s]: long enough for the order of the substeps to matter
+    inputs, measured = run.record.inputs[:count], run.record.measured[:count]
+    means, covariances = loops.trace(
+        x, P, inputs, measured, run.record.deviations**2, PARAMETERS.vector(), q, step, parts
+    )
+    found = loops.smooth(means, covariances, inputs, PARAMETERS.vector(), q, step, parts)
+
+    def carried(state, given):
+        for _ in range(parts):
+            state = np.concatenate([process.evaluate(state[:8], given, step / parts), state[8:]])
+        return state
+
+    expected = means.copy()
+    for n in range(count - 2, -1, -1):
+        state, P = means[n].copy(), covariances[n].copy()
+        for _ in range(parts):
+            F = np.eye(12)
+            F[:8, :8] = process.jacobian(state[:8], inputs[n], step / parts)
+            P = F @ P @ F.T + 0.5 * step / parts * (F @ np.diag(q) @ F.T + np.diag(q))
+            state = np.concatenate([process.evaluate(state[:8], inputs[n], step / parts), state[8:]])
+        columns = [
+            (carried(means[n] + d, inputs[n]) - carried(means[n] - d, inputs[n])) / 2e-6 for d in 1e-6 * np.eye(12)
+        ]
+        total = np.array(columns).T
+        gain = covariances[n] @ total.T @ np.linalg.inv(P + 1e-12 * np.eye(12))
+        expected[n] = means[n] + gain @ (expected[n + 1] - state)
+    assert found == pytest.approx(expected, abs=1e-5)
 
 
 def test_bad_input_is_refused():

@@ -16,7 +16,7 @@ from auvsim.identification.readers import read
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signal, Signals
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.simulation.run import run as run_trial
 
 NORTH, EAST, HEADING, SURGE, YAW_RATE = (MEASURED.index(n) for n in ("north", "east", "heading", "surge", "yaw_rate"))
 
@@ -266,14 +266,15 @@ def test_strays_are_found_and_nothing_else() -> None:
             "heading": (t, record.measured[:, 2]),
         }
         given |= {name: (t, record.measured[:, MEASURED.index(name)]) for name in ("ground_surge", "ground_sway")}
-        assert np.array_equal(reckoning.strays(given, 0.5), wrong), seed
+        assert np.array_equal(reckoning.outliers(given, 0.5), wrong), seed
 
 
 def test_a_trial_log_is_read_as_the_vehicle_sensed_it(tmp_path: Path) -> None:
     """Against the truth of the same log: no error beyond the sensors', and nothing lost or flagged by truth is used."""
     plan = sampling.merge(sampling.manoeuvre_plan("zigzag"), {"manoeuvre": {"duration": 60.0}})
-    truth = run_trial(scenario.parse(sampling.draw(plan, 5)), seed=5)
-    log.write(truth, tmp_path / "zigzag.nc")
+    found = run_trial(scenario.parse(sampling.draw(plan, 5)), seed=5)
+    log.write(found, tmp_path / "zigzag.nc")
+    truth = found.vehicle()
     record, _ = only(tmp_path / "zigzag.nc")
     assert record.kind == "zigzag"
     at = np.searchsorted(truth["truth"]["time"], record.times - 1e-6)
@@ -298,16 +299,17 @@ def test_a_trial_log_is_read_as_the_vehicle_sensed_it(tmp_path: Path) -> None:
 
 
 def test_docking_logs_leave_out_what_is_not_planar(tmp_path: Path) -> None:
-    """Steep dives and the time in the dock are barred; what is left is level and before the dock."""
+    """Steep dives and the time in the dock are excluded; what is left is level and before the dock."""
     plan = scenario.parse(
         sampling.draw(sampling.merge(sampling.default_plan(), {"vehicle": {"start": {"depth": 10.0}}}), 1)
     )
-    trial = run_trial(plan, seed=1)
-    log.write(trial, tmp_path / "trial.nc")
+    found = run_trial(plan, seed=1)
+    log.write(found, tmp_path / "trial.nc")
+    trial = found.vehicle()
     readings = read([tmp_path / "trial.nc"])
     assert readings.records
     assert "left out" in " ".join(readings.notes)
-    docked = trial["guidance"]["time"][trial["guidance"]["phase"] == 4]
+    docked = trial["mission"]["time"][trial["mission"]["phase"] == 4]
     for record in readings.records:
         at = np.searchsorted(trial["truth"]["time"], record.times - 1e-6)
         assert np.abs(np.degrees(trial["truth"]["attitude"][at, 1])).max() < 10.0
@@ -338,7 +340,7 @@ def test_another_vehicles_log_is_refused(tmp_path: Path) -> None:
 def test_strays_need_a_heading() -> None:
     """Positions alone are not judged."""
     t = np.arange(20.0)
-    assert not reckoning.strays({"north": (t, t), "east": (t, 100.0 * (t == 9))}, 0.5).any()
+    assert not reckoning.outliers({"north": (t, t), "east": (t, 100.0 * (t == 9))}, 0.5).any()
 
 
 def test_signals_without_positions_stay_as_they_are() -> None:

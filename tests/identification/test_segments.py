@@ -101,12 +101,12 @@ def test_forward_sensitivities_equal_finite_differences():
         columns.append((weighted(unknowns - step)[0] - weighted(unknowns + step)[0]) / (2.0 * step[j]))
     J = np.array(columns).T  # of what is expected, weighted
     H = np.triu(J.T @ J)
-    found = np.triu(point.folds[0][0][0]) - np.diag(np.concatenate([HELD, np.zeros(len(unknowns) - 6)]))
+    found = np.triu(point.normal_equations[0][0][0]) - np.diag(np.concatenate([HELD, np.zeros(len(unknowns) - 6)]))
     scale = np.sqrt(np.diag(H))
     scale[scale == 0.0] = 1.0
     # Central differences: truncation some (1e-5)^2, rounding 1e-16 / 1e-5; both far below.
     assert found / np.outer(scale, scale) == pytest.approx(H / np.outer(scale, scale), abs=1e-6)
-    descent = point.folds[0][1][0] / scale / np.linalg.norm(e)
+    descent = point.normal_equations[0][1][0] / scale / np.linalg.norm(e)
     away = np.concatenate([HELD * (p.cuts[0].held[0] - state[0]), np.zeros(len(unknowns) - 6)])
     assert descent == pytest.approx((J.T @ e + away) / scale / np.linalg.norm(e), abs=1e-6)
 
@@ -122,12 +122,12 @@ def test_elimination_equals_the_full_normal_equations():
     p = Problem([run.record for run in runs], PARAMETERS, FREE, options, 2.0, states)
     point = p.at(p.start.vector()[p.indices], p.nuisances, [cut.held for cut in p.cuts])
     k = len(FREE)
-    H, g, backs = p.reduced(point, 0.0)
+    H, g, back_substitution = p.reduced(point, 0.0)
     step = np.linalg.solve(H, g)
     width = len(g) + sum(6 * len(cut.held) for cut in p.cuts)
     full, gradient = np.zeros((width, width)), np.zeros(width)
     at = len(g)
-    for r, (blocks, descents) in enumerate(point.folds):
+    for r, (blocks, descents) in enumerate(point.normal_equations):
         own = np.concatenate([np.arange(k), np.arange(k + 6 * r, k + 6 * r + 6)])
         for block, descent in zip(blocks, descents, strict=True):
             places = np.concatenate([np.arange(at, at + 6), own])
@@ -141,8 +141,8 @@ def test_elimination_equals_the_full_normal_equations():
     whole = np.linalg.solve(full / np.outer(scale, scale), gradient / scale) / scale
     deviations = np.sqrt(np.diag(np.linalg.inv(full / np.outer(scale, scale)))) / scale
     assert step / deviations[: len(g)] == pytest.approx(whole[: len(g)] / deviations[: len(g)], abs=1e-9)
-    firsts = [back[:, :, -1] - back[:, :, np.r_[:k, k : k + 6]] @ np.r_[step[:k], step[k + 6 * r : k + 6 * r + 6]]
-              for r, back in enumerate(backs)]  # fmt: skip
+    firsts = [matrix[:, :, -1] - matrix[:, :, np.r_[:k, k : k + 6]] @ np.r_[step[:k], step[k + 6 * r : k + 6 * r + 6]]
+              for r, matrix in enumerate(back_substitution)]  # fmt: skip
     together = np.concatenate([first.ravel() for first in firsts])
     assert together / deviations[len(g) :] == pytest.approx(whole[len(g) :] / deviations[len(g) :], abs=1e-9)
 
@@ -295,7 +295,7 @@ def test_a_weak_prior_holds_what_data_do_not():
     size = np.abs([getattr(PARAMETERS, name) for name in free])
     assert (held.deviations <= 0.3 * size).all()
     assert (loose.deviations > 1.5 * held.deviations).any()
-    one = fit_segments([run.record], PARAMETERS, free, SegmentOptions(prior=0.3, believed=("X_nu",)))
+    one = fit_segments([run.record], PARAMETERS, free, SegmentOptions(prior=0.3, prior_on=("X_nu",)))
     assert one.deviations[2] <= 0.3 * size[2]
     assert (one.deviations[:2] > held.deviations[:2]).all()  # the data alone tell these
 

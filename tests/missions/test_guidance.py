@@ -5,31 +5,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from dockings import DOCK_DEPTH, LATCHED, MOUTH, NOSE, PERIOD, SETTINGS, new, update
 
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
-from auvsim.missions.docking.guidance import (
-    CLEAR,
-    Command,
-    Geometry,
-    Guidance,
-    GuidanceSettings,
-    Phase,
-    approach_course,
-    heading_for_course,
-)
-from auvsim.navigation.navigator import Estimate
+from auvsim.control.controller import Setpoints
+from auvsim.missions.docking.guidance import CLEAR, Docking, Phase, approach_course
+from auvsim.missions.line_of_sight import heading_for_course
+from auvsim.navigation.estimate import Estimate
 
-SETTINGS = GuidanceSettings()
-NOSE, MOUTH, LATCHED = 0.8, 0.75, 1.3  # of vehicle and dock [m]
-DOCK_DEPTH = 12.0
 LIMIT = math.radians(SETTINGS.heading_limit_deg)
-PERIOD = 0.1  # of control [s]
-
-
-def new(settings: GuidanceSettings = SETTINGS) -> Guidance:
-    """A guidance at the beginning of a trial."""
-    return Guidance(settings, Geometry(nose=NOSE, mouth_radius=MOUTH, latched=LATCHED))
 
 
 def fix(time: float, axis: float = 0.0, depth: float = DOCK_DEPTH) -> Reading:
@@ -54,16 +39,16 @@ def estimate(time, north, east, heading, speed=1.0, current=(0.0, 0.0), sigma=0.
 class Script:
     """Feeds a guidance of axis north with places of the nose, as if estimated exactly, a tick apart."""
 
-    guidance: Guidance
+    guidance: Docking
     time: float = 0.0
 
-    def tick(self, along, cross=0.0, fixed=True, sigma=0.1, latched=False, after=PERIOD) -> Command:
+    def tick(self, along, cross=0.0, fixed=True, sigma=0.1, latched=False, after=PERIOD) -> Setpoints:
         """One call, `after` [s] the last, with or without a new fix."""
         self.time += after
         if fixed:
-            self.guidance.observe([fix(self.time)])
+            self.guidance._observe([fix(self.time)])
         here = estimate(self.time, along - NOSE, cross, 0.0, sigma=sigma)
-        return self.guidance.update(self.time, here, 0.0, DOCK_DEPTH, latched)
+        return update(self.guidance, self.time, here, 0.0, DOCK_DEPTH, latched)
 
     @property
     def last(self) -> tuple[str, str]:
@@ -128,7 +113,7 @@ def test_turned_line_runs_through_the_entrance() -> None:
     line = approach_course(0.0, SETTINGS.approach_speed, current, LIMIT)
     assert line > 0.1  # turned with the current that flows to starboard: the crab would be 30 degrees
     guidance = new()
-    guidance.observe([fix(0.1)])
+    guidance._observe([fix(0.1)])
     courses = {}
     for off in (-2.0, 0.0, 2.0):
         distance = 60.0
@@ -136,7 +121,7 @@ def test_turned_line_runs_through_the_entrance() -> None:
         north = -distance * math.cos(line) - off * math.sin(line) - NOSE * math.cos(heading)
         east = -distance * math.sin(line) + off * math.cos(line) - NOSE * math.sin(heading)
         guidance.phase = Phase.APPROACH
-        command = guidance.update(0.1, estimate(0.1, north, east, heading, current=current), heading, 12.0, False)
+        command = update(guidance, 0.1, estimate(0.1, north, east, heading, current=current), heading, 12.0, False)
         velocity = over_ground(command.heading, command.speed, current)
         courses[off] = wrap(math.atan2(velocity[1], velocity[0]) - line)
     assert courses[0.0] == pytest.approx(0.0, abs=1e-9)
@@ -148,9 +133,9 @@ def test_turned_line_runs_through_the_entrance() -> None:
 def test_dead_reckoning_from_an_old_estimate() -> None:
     """Between estimates the nose is carried on by speed through the water and current."""
     guidance = new()
-    guidance.observe([fix(0.1)])
+    guidance._observe([fix(0.1)])
     old = estimate(10.0, -100.0, 5.0, 0.3, speed=1.2, current=(0.1, -0.2))
-    guidance.update(10.4, old, 0.3, DOCK_DEPTH, False)
+    update(guidance, 10.4, old, 0.3, DOCK_DEPTH, False)
     assert guidance.along == pytest.approx(-100.0 + 0.4 * (1.2 * math.cos(0.3) + 0.1) + NOSE * math.cos(0.3))
     assert guidance.cross == pytest.approx(5.0 + 0.4 * (1.2 * math.sin(0.3) - 0.2) + NOSE * math.sin(0.3))
 
@@ -160,7 +145,7 @@ def test_axis_and_depth_are_means_of_the_reports_across_south() -> None:
     guidance = new()
     broken = fix(3.0)
     broken.value[0] = math.nan
-    guidance.observe([fix(1.0, math.pi - 0.01, 12.2), fix(2.0, -math.pi + 0.03, 11.9), broken])
+    guidance._observe([fix(1.0, math.pi - 0.01, 12.2), fix(2.0, -math.pi + 0.03, 11.9), broken])
     assert wrap(guidance.axis - (math.pi + 0.01)) == pytest.approx(0.0, abs=1e-12)
     assert guidance.dock_depth == pytest.approx(12.05)
 
@@ -168,10 +153,11 @@ def test_axis_and_depth_are_means_of_the_reports_across_south() -> None:
 def test_phases_of_a_docking_in_their_order() -> None:
     """Search, homing, approach, final, docked: where each begins, and what it commands."""
     guidance = new()
+    held = Setpoints(0.7, 5.0, SETTINGS.approach_speed)
     for time in (0.0, 5.0):  # holds what it had, although the vehicle has turned meanwhile
-        assert guidance.update(time, None, 0.7 + time, 5.0 + time, False) == (0.7, 5.0, SETTINGS.approach_speed)
+        assert update(guidance, time, None, 0.7 + time, 5.0 + time, False) == held
     waiting = estimate(5.0, 0.0, 0.0, 0.0, initialised=False)
-    guidance.update(5.0, waiting, 0.0, 5.0, False)
+    update(guidance, 5.0, waiting, 0.0, 5.0, False)
     assert guidance.phase == Phase.SEARCH
     script = Script(guidance, time=5.0)
     places = {-300.0: Phase.HOMING, -221.0: Phase.HOMING, -219.0: Phase.APPROACH, -20.5: Phase.APPROACH}
@@ -233,14 +219,14 @@ def test_only_uncertainty_across_the_axis_counts() -> None:
     """An error along the axis only changes when the vehicle arrives: a dock that faces east, uncertain east."""
     guidance, axis = new(), math.pi / 2
     for time, along in ((0.1, -250.0), (1.0, -190.0), (2.0, -15.0), (30.0, -10.0)):
-        guidance.observe([fix(time, axis)])
+        guidance._observe([fix(time, axis)])
         here = estimate(time, 0.0, along - NOSE, axis, sigma=0.1)
         here.covariance[1, 1] = 25.0
-        guidance.update(time, here, axis, DOCK_DEPTH, False)
+        update(guidance, time, here, axis, DOCK_DEPTH, False)
     assert guidance.phase == Phase.FINAL
-    guidance.observe([fix(41.0, axis)])
+    guidance._observe([fix(41.0, axis)])
     here.covariance[0, 0], here.covariance[1, 1] = 25.0, 0.01
-    guidance.update(41.0, here, axis, DOCK_DEPTH, False)
+    update(guidance, 41.0, here, axis, DOCK_DEPTH, False)
     assert guidance.phase == Phase.GO_AROUND
 
 
@@ -267,9 +253,9 @@ def test_gives_up_when_lost(fixed: bool) -> None:
     if fixed:
         Script(guidance, time=49.9).tick(-300.0)
         start = 50.0
-    guidance.update(start + 179.9, None, 0.0, 5.0, False)
+    update(guidance, start + 179.9, None, 0.0, 5.0, False)
     assert not guidance.finished
-    assert guidance.update(start + 180.1, None, 0.0, 5.0, False).speed == 0.0
+    assert update(guidance, start + 180.1, None, 0.0, 5.0, False).speed == 0.0
     assert guidance.phase == Phase.ABORTED
     assert guidance.events[-1].text == "no fix for 180 s"
 
@@ -287,7 +273,7 @@ class Point:
     current: tuple[float, float]
     speed: float = 1.0
 
-    def step(self, command: Command) -> None:
+    def step(self, command: Setpoints) -> None:
         """One control period."""
         self.speed += PERIOD / 3.0 * (command.speed - self.speed)  # surge lags by some seconds
         limit = abs(self.speed) / RADIUS
@@ -314,7 +300,7 @@ class Point:
 class Passage:
     """What a point vehicle did."""
 
-    guidance: Guidance
+    guidance: Docking
     cross: float  # of the nose where it passes the mouth's plane for the last time [m]
     heading_error: float  # there, from the axis [rad]
     clearance: dict[Phase, float]  # least one while moving ahead in each phase [m]
@@ -332,13 +318,13 @@ def run(point: Point, axis: float, blind_until: float = -math.inf, error: float 
     for tick in range(20_000):
         time = tick * PERIOD
         if tick % 50 == 0:
-            guidance.observe([fix(time, axis)])
+            guidance._observe([fix(time, axis)])
         along, cross = point.in_dock(axis, NOSE)
         if tick % 5 == 0:
             off = error if guidance.attempt == 1 and along < blind_until else 0.0
             north, east = point.north - off * math.sin(axis), point.east + off * math.cos(axis)
             here = estimate(time, north, east, point.heading, point.speed, point.current)
-        command = guidance.update(time, here, point.heading, DOCK_DEPTH, latched)
+        command = update(guidance, time, here, point.heading, DOCK_DEPTH, latched)
         if latched:
             return passage
         point.step(command)

@@ -4,18 +4,17 @@ import math
 
 import numpy as np
 import pytest
-from synthetic import ATTRIBUTES, trial_log
+from synthetic import trial_log, writer
 
+from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import euler_to_quaternion, rotation, wrap
-from auvsim.data.log import TrialLog
-from auvsim.data.recorder import LogWriter
-from auvsim.missions.docking.guidance import Phase
+from auvsim.data.log import VehicleLog
 from auvsim.missions.manoeuvres import metrics
 from auvsim.missions.manoeuvres.metrics import Motion
-from auvsim.missions.manoeuvres.settings import SpiralSettings
+from auvsim.missions.manoeuvres.mission import Manoeuvre
+from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings, SpiralSettings
 from auvsim.physics.truth import Truth
-from auvsim.simulation import sampling, scenario
 
 APPROACH, SPEED, RATE = 20.0, 1.5, math.radians(5.0)
 RADIUS = SPEED / RATE
@@ -23,9 +22,8 @@ RADIUS = SPEED / RATE
 
 def manoeuvre_log(kind: str, heading, *, until: float, current=(0.0, 0.0, 0.0), course: float = 0.0, **manoeuvre):
     """A log at 10 Hz of a vehicle that goes ahead at SPEED through the water, its heading a function of time."""
-    plan = sampling.merge(sampling.manoeuvre_plan(kind), {"manoeuvre": manoeuvre})
-    settings = scenario.parse(sampling.draw(plan, 0))
-    log = LogWriter(attributes={**ATTRIBUTES, "scenario": scenario.to_yaml(settings)}, fins=4)
+    settings = ManoeuvreMissionSettings.model_validate({"manoeuvre": {"kind": kind, **manoeuvre}})
+    log = writer("manoeuvre", mission_settings=yaml_text.dump(settings.model_dump(mode="json")))
     place = np.array([300.0, 0.0, 10.0])
     for tick in range(round(10.0 * until) + 1):
         time = 0.1 * tick
@@ -36,11 +34,11 @@ def manoeuvre_log(kind: str, heading, *, until: float, current=(0.0, 0.0, 0.0), 
         log.truth(
             Truth(
                 time=time, position=place, quaternion=euler_to_quaternion(0.0, 0.0, yaw),
-                attitude=np.array([0.0, 0.0, wrap(yaw)]), nu=nu, current=np.array(current), fins=np.zeros(4),
-                shaft_speed=100.0,
+                attitude=np.array([0.0, 0.0, wrap(yaw)]), nu=nu, current=np.array(current),
+                actuators=np.array([0.0, 0.0, 0.0, 0.0, 100.0]),
             )
         )  # fmt: skip
-        log.append("guidance", (time, Phase.MANOEUVRE, 1, yaw, 10.0, SPEED, math.nan, math.nan))
+        log.append("mission", (time, 0, yaw, 10.0, SPEED))
         log.append("command", (time, math.copysign(0.2, rate), 0.0, 100.0))
         middle = rotation(0.0, 0.0, course + heading(time + 0.05))
         place = place + 0.1 * (middle @ (SPEED, 0.0, 0.0) + current)
@@ -137,16 +135,53 @@ def test_spiral_slope_and_loop(loop: float) -> None:
 
 
 def test_a_docking_trial_is_no_manoeuvre() -> None:
-    """It is told apart by its phases; its figures are refused."""
-    assert not metrics.is_manoeuvre(trial_log())
-    docking = LogWriter(attributes={**ATTRIBUTES, "scenario": "duration: 10.0"}, fins=4).finish("complete")
-    with pytest.raises(InputError, match="docking trial"):
+    """It is told apart by its mission; its figures are refused."""
+    docking = trial_log()
+    assert not metrics.is_manoeuvre(docking)
+    with pytest.raises(InputError, match="the mission of 'remus100' is docking, not a manoeuvre"):
         metrics.figures(docking)
 
 
 def test_an_interrupted_manoeuvre_has_no_figures_of_what_did_not_begin() -> None:
     """Stopped in the approach: nothing; the log is still one of a manoeuvre."""
-    log: TrialLog = manoeuvre_log("zigzag", lambda t: 0.0, until=10.0)
+    log: VehicleLog = manoeuvre_log("zigzag", lambda t: 0.0, until=10.0)
     assert metrics.is_manoeuvre(log)
     assert metrics.figures(log) == []
-    assert metrics.summary(log) == {"status": "complete", "manoeuvres": []}
+    found = Manoeuvre.metrics(log)
+    assert {key: value for key, value in found.items() if value is not None} == {"finished": False, "manoeuvres": []}
+
+
+@pytest.mark.parametrize("form", ["mission_settings", "old scenario"])
+def test_what_was_done_is_read_from_logs_of_any_format(form: str) -> None:
+    """New logs say it of the vehicle; those of formats 1 and 2 in their scenario alone."""
+    text = "manoeuvre: {kind: spiral, rudder_deg: 8.0, step_deg: 4.0, hold: 11.0}\n"
+    recorder = writer(
+        "manoeuvre", **({"mission_settings": f"kind: manoeuvre\n{text}"} if form == "mission_settings" else {})
+    )
+    log = recorder.finish("complete")
+    if form == "old scenario":
+        log.log.attributes["scenario"] = f"duration: 400.0\nvehicle: {{model: remus100}}\n{text}"
+    found = metrics.settings(log)
+    assert found == SpiralSettings(rudder_deg=8.0, step_deg=4.0, hold=11.0)
+    assert found.duration == 20.0 + 9 * 11.0
+
+
+def test_settings_that_cannot_be_read_are_bad_input() -> None:
+    log = writer("manoeuvre", mission_settings="manoeuvre: {kind: spiral, hold: fast}").finish("complete")
+    with pytest.raises(InputError, match=r"mission of 'remus100'.*hold"):
+        metrics.settings(log)
+    with pytest.raises(InputError, match=r"mission of 'remus100'.*manoeuvre"):
+        metrics.settings(writer("manoeuvre", mission_settings="kind: manoeuvre").finish("complete"))
+
+
+def test_columns_are_what_the_mission_gives() -> None:
+    """Of a sequence each from the first manoeuvre that has it; a circle after a zig-zag has its own advance."""
+    parts = [{"kind": "straight", "duration": 40.0, "approach": 10.0}, {"kind": "circle", "duration": 100.0}]
+    log = manoeuvre_log("sequence", lambda t: RATE * max(t - 60.0, 0.0), until=139.9, parts=parts)
+    found = Manoeuvre.metrics(log)
+    assert found.keys() - {"manoeuvres"} == Manoeuvre.columns.keys() == {"finished", *metrics.LABELS}
+    assert [part["kind"] for part in found["manoeuvres"]] == ["straight", "circle"]
+    assert found["advance"] == found["manoeuvres"][1]["advance"] == pytest.approx(RADIUS, rel=1e-3)
+    assert found["duration"] == found["manoeuvres"][0]["duration"] == pytest.approx(30.0)
+    assert not found["finished"]  # at 139.9 s of 140
+    assert metrics.LABELS["advance"] == "advance [m]"

@@ -9,13 +9,12 @@ from pydantic import TypeAdapter
 
 from auvsim.base.errors import InputError
 from auvsim.data import log
-from auvsim.data.log import TrialLog
+from auvsim.data.log import VehicleLog
 from auvsim.missions.docking.dock_frame import to_body
-from auvsim.missions.docking.guidance import Phase
 from auvsim.missions.manoeuvres.laws import Order, Steering, binary_sequence, multisine
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings, SpiralSettings
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
+from auvsim.simulation.run import run as run_scenario
 
 LIMIT = math.radians(15.0)
 DEG = math.pi / 180.0
@@ -187,23 +186,24 @@ def test_bad_settings_are_refused(manoeuvre: dict, text: str) -> None:
     assert "\n" not in str(error.value)
 
 
-def run(seed: int = 1, trial: int = 0, **manoeuvre: Any) -> TrialLog:
+def run(seed: int = 1, trial: int = 0, **manoeuvre: Any) -> VehicleLog:
     """Carries a manoeuvre out."""
-    return run_trial(parsed(manoeuvre), seed=seed, trial=trial)
+    return run_scenario(parsed(manoeuvre), seed=seed, trial=trial).vehicle()
 
 
 @pytest.fixture(scope="module")
-def zigzag() -> TrialLog:
+def zigzag() -> VehicleLog:
     """A zig-zag of a minute and a half."""
     return run(kind="zigzag", duration=90.0)
 
 
-def test_a_manoeuvre_is_logged_whole(zigzag: TrialLog) -> None:
+def test_a_manoeuvre_is_logged_whole(zigzag: VehicleLog) -> None:
     """It ends when it is over, complete, with DVL and gyro at their rates, far from the dock and at its depth."""
-    assert zigzag.attributes["status"] == "complete"
-    truth, guidance = zigzag["truth"], zigzag["guidance"]
+    assert zigzag.log.attributes["status"] == "complete"
+    truth, guidance = zigzag["truth"], zigzag["mission"]
     assert truth["time"][-1] == pytest.approx(90.0, abs=1e-9)
-    assert set(guidance["phase"].tolist()) == {Phase.MANOEUVRE}
+    assert zigzag.phases == ("manoeuvre",)
+    assert set(guidance["phase"].tolist()) == {0}
     event = zigzag["event"]
     told = event["text"][event["kind"] != "refused"].tolist()  # what the estimator refuses is by chance
     assert told == ["zigzag: approach", "zigzag"]
@@ -216,7 +216,7 @@ def test_a_manoeuvre_is_logged_whole(zigzag: TrialLog) -> None:
     np.testing.assert_allclose(truth["position"][:, 2] + bias, 10.0, atol=0.25)
 
 
-def test_the_rudder_switches_on_the_compass(zigzag: TrialLog) -> None:
+def test_the_rudder_switches_on_the_compass(zigzag: VehicleLog) -> None:
     """Where the measured heading has turned by 10 deg; the truth is off by bias and smoothing."""
     command, compass = zigzag["command"], zigzag["compass"]
     rudder = command["rudder"][command["time"] > 20.05]
@@ -234,19 +234,21 @@ def test_the_rudder_switches_on_the_compass(zigzag: TrialLog) -> None:
 def test_the_same_seed_gives_the_same_manoeuvre() -> None:
     """Bit for bit; another trial has other noises."""
     first, again = (run(kind="prbs", duration=30.0) for _ in range(2))
-    assert log.differences(first, again) == []
-    other = log.differences(first, run(kind="prbs", duration=30.0, trial=1))
-    assert {"dvl/value", "gyro/value", "compass/value"} <= set(other)
+    assert log.differences(first.log, again.log) == []
+    other = log.differences(first.log, run(kind="prbs", duration=30.0, trial=1).log)
+    assert {f"vehicles/remus100/sensors/{name}/value" for name in ("dvl", "gyro", "compass")} <= set(other)
 
 
 def test_new_sensors_change_nothing_else() -> None:
     """A docking trial with DVL and gyro is, apart from their groups, the trial without them, bit for bit."""
     plan = sampling.merge(sampling.default_plan(), {"duration": 60.0})
     on = sampling.merge(plan, {"sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}}})
-    without, with_them = (run_trial(scenario.parse(sampling.draw(values, 4)), seed=4) for values in (plan, on))
-    assert len(without["dvl"]["time"]) == len(without["gyro"]["time"]) == 0
-    sensors = {f"{group}/{name}" for group in ("dvl", "gyro") for name in ("time", "received", "value", "sequence")}
-    assert set(log.differences(without, with_them)) == sensors | {"scenario"}
+    without, with_them = (run_scenario(scenario.parse(sampling.draw(values, 4)), seed=4) for values in (plan, on))
+    assert "dvl" not in without.vehicle()
+    assert "gyro" not in without.vehicle()
+    names = [f"vehicles/remus100/sensors/{sensor}" for sensor in ("dvl", "gyro")]
+    sensors = {f"{group}/{name}" for group in names for name in ("time", "received", "value", "sequence")}
+    assert set(log.differences(without, with_them)) == sensors | {f"{group} (tables)" for group in names} | {"scenario"}
 
 
 def test_a_speed_beyond_the_propeller_is_refused() -> None:
@@ -262,6 +264,6 @@ def test_shaft_speed_steps_with_the_speed() -> None:
     through = truth["nu"][:, :3] - to_body(truth["quaternion"], truth["current"])
     for end, speed in ((50.0, 1.0), (80.0, 1.8)):
         settled = (truth["time"] > end - 5.0) & (truth["time"] < end)
-        # The planar model that gives the shaft speed is condensed at 1 m/s; its error at 1.8 m/s is below 2 %.
+        # The planar model that gives the shaft speed is fitted at 1 m/s; its error at 1.8 m/s is below 2 %.
         np.testing.assert_allclose(through[settled, 0], speed, rtol=0.02)
     assert len(set(np.round(trial["command"]["shaft_speed"], 6))) == 3

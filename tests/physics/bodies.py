@@ -15,6 +15,8 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from auvsim.physics import hydrodynamics
+from auvsim.physics.forces import RECORD
+from auvsim.physics.water_slot import WATER
 from auvsim.vehicles import library
 
 Array = NDArray[Any]
@@ -122,7 +124,7 @@ def free_body(
         tree = f'<body name="frame"><freejoint/>{hull}</body>'
     hull_fields = {"hull_added_mass": added_mass, "hull_displaced_volume": volume} | dict(fields or {})
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><compiler angle="radian"/><size nuser_body="147" nuserdata="19"/>'
+        f'<mujoco><compiler angle="radian"/><size nuser_body="{RECORD}" nuserdata="{WATER}"/>'
         f'<option timestep="{timestep}" integrator="{integrator}" gravity="0 0 {-gravity}" {option}/>'
         f"<worldbody>{world}{tree}</worldbody>{outside}"
         f"<custom>{numerics(hull_fields) if equip else ''}</custom></mujoco>"

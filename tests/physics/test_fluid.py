@@ -10,6 +10,8 @@ import pytest
 
 from auvsim.base.errors import AuvsimError
 from auvsim.physics import fluid, hydrodynamics, mujoco_structs
+from auvsim.physics.forces import RECORD
+from auvsim.physics.water_slot import SURFACE
 
 FACTOR = np.random.default_rng(0).uniform(-1.0, 1.0, (6, 6)) + 3.0 * np.eye(6)
 FIELDS = {
@@ -50,7 +52,8 @@ def scene(*parts, boats=()):
     """A model of the parts, equipped if there are boats; the boats have no geoms, so nothing touches them."""
     custom = "".join(numerics(name) for name in boats)
     model = mujoco.MjModel.from_xml_string(
-        f'<mujoco><size nuser_body="147" nuserdata="38"/><option integrator="implicitfast" timestep="0.005"/>'
+        f'<mujoco><size nuser_body="{RECORD}" nuserdata="{2 * fluid.WATER}"/>'
+        '<option integrator="implicitfast" timestep="0.005"/>'
         f"<worldbody>{''.join(parts)}</worldbody><custom>{custom}</custom></mujoco>"
     )
     slots = hydrodynamics.equip(model)
@@ -69,7 +72,7 @@ def start(model, data, name, slots, seed):
         *random.uniform(-0.2, 0.2, 2),
     ]
     data.qvel[v : v + 8] = random.normal(size=8) * 0.5
-    data.userdata[slots[name] : slots[name] + fluid.WATER] = 0.1 * random.normal(size=fluid.WATER)
+    data.userdata[slots[name] : slots[name] + SURFACE] = 0.1 * random.normal(size=fluid.WATER)[:SURFACE]
     return slice(q, q + 9), slice(v, v + 8)
 
 
@@ -162,12 +165,12 @@ def test_a_strange_mujoco_is_refused_before_anything_is_installed(monkeypatch):
         mujoco.set_mjcb_passive(callback)
 
 
-@pytest.mark.parametrize("changed", ["forces.py", "pointers.py"])
+@pytest.mark.parametrize("changed", fluid.INSIDE)
 def test_compiled_code_older_than_what_it_holds_is_forgotten(monkeypatch, tmp_path, changed):
     """Numba's cache would go on with yesterday's forces: it looks only at the file of the function that it keeps."""
     folder = tmp_path / "cache"
     folder.mkdir()
-    for name in ("forces.py", "pointers.py"):
+    for name in fluid.INSIDE:
         (tmp_path / name).touch()
         os.utime(tmp_path / name, (0.0, 0.0))
     for name in ("fluid._hull-1.nbi", "fluid._build.passive-1.nbi", "forces.hull_force-1.nbi"):

@@ -135,7 +135,10 @@ def test_a_turning_current_carries_a_neutral_body_along():
 
 
 def test_water_of_another_place_and_time_is_the_expansions():
-    """Force at rest at (t, x) in water v + a t + G x is that of a motion at -(v + a t + G x), plus that of a_c."""
+    """Force at rest at (t, x) in water v + a t + G x is that of a motion at -(v + a t + G x), plus what a and G push.
+
+    At rest over ground the hull meets no other water: its added mass feels dv/dt alone, and G' p (Galper & Miloh 1995).
+    """
     random = np.random.default_rng(1)
     added = dense(1, 20.0, 2.0)
     fields = {"hull_linear_damping": np.diag([3.0, 4.0, 5.0, 0.0, 0.0, 0.0])}
@@ -152,6 +155,8 @@ def test_water_of_another_place_and_time_is_the_expansions():
         found = body_force(model, data)
         set_water(data)
         set_motion(model, data, [*-here, 0, 0, 0])
-        pressure = np.concatenate([a + G @ here, np.zeros(3)])
-        expected = body_force(model, data) + added @ pressure + DENSITY * 0.01 * pressure
+        none = np.zeros(3)
+        expected = body_force(model, data) + added @ np.concatenate([a, none])
+        expected += DENSITY * 0.01 * np.concatenate([a + G @ here, none])
+        expected[:3] -= G.T @ (added @ np.concatenate([-here, none]))[:3]
         assert found == pytest.approx(expected, abs=1e-11)  # rounding of a sum of about 50 N

@@ -9,7 +9,7 @@ import pytest
 from auvsim.base.errors import InputError
 from auvsim.base.frames import flip_matrix
 from auvsim.physics import fluid, hydrodynamics
-from auvsim.physics.forces import FIN, HEAD, HULL, PROPELLER, RECORD, STRIPS
+from auvsim.physics.forces import DERIVED, FIN, HEAD, HULL, PROPELLER, RECORD, STRIPS
 from auvsim.vehicles import library
 
 RANDOM = np.random.default_rng(0)
@@ -37,7 +37,7 @@ def model(
     fields=None,
     *,
     without=(),
-    size='nuser_body="147" nuserdata="19"',
+    size=f'nuser_body="{RECORD}" nuserdata="{fluid.WATER}"',
     option="",
     joint="<freejoint/>",
     centre="0 0 -0.02",
@@ -93,12 +93,12 @@ def test_records_are_in_mujocos_axes_and_the_rest_is_zero():
 
 
 def test_tables_do_not_overlap_and_fit_the_record():
-    for table in (HULL, FIN, PROPELLER):
+    for table in (HULL | DERIVED, FIN, PROPELLER):
         spans = sorted(table.values())
         assert spans[0][0] == HEAD
         assert all(at + count == following for (at, count), (following, _) in itertools.pairwise(spans))
         assert sum(spans[-1]) <= RECORD
-    assert sum(max(HULL.values())) == RECORD
+    assert sum(max((HULL | DERIVED).values())) == RECORD
 
 
 def test_two_vehicles_have_two_slots_of_water():
@@ -107,11 +107,11 @@ def test_two_vehicles_have_two_slots_of_water():
         '<body name="ball"><freejoint/><geom size="0.1"/></body>'
     )
     fields = {"second_added_mass": text(np.eye(6)), "second_displaced_volume": "0.001"}
-    m = model(fields, size='nuser_body="147" nuserdata="38"', more=other)
+    m = model(fields, size=f'nuser_body="{RECORD}" nuserdata="{2 * fluid.WATER}"', more=other)
     assert hydrodynamics.equip(m) == {"boat": 0, "second": fluid.WATER}
     assert m.body_user[m.body("second").id, 1] == fluid.WATER
     message = refusal(model(fields, more=other))
-    assert message == "2 vehicles need <size nuserdata='38'>, not 19"
+    assert message == f"2 vehicles need <size nuserdata='{2 * fluid.WATER}'>, not {fluid.WATER}"
 
 
 def test_a_model_without_fields_is_left_alone():
@@ -139,7 +139,10 @@ def test_equipping_twice_is_equipping_once():
     [
         ({"hull_wings": "1"}, "hull 'hull' has no field 'wings'; there are added_mass"),
         ({"keel_added_mass": "1"}, "numeric 'keel_added_mass' names no body; bodies: world, boat, hull, fin, screw"),
-        ({"boat_stall_angle": "1"}, "body 'boat' has the fields stall_angle but no boat_added_mass or boat_area"),
+        (
+            {"boat_stall_angle": "1"},
+            "body 'boat' has the fields stall_angle but no boat_added_mass or boat_area or boat_diam",
+        ),
         ({"hull_added_mass": "1 2 3"}, "'hull_added_mass' has 3 numbers instead of 36"),
         ({"screw_thrust_coefficients": "1"}, "'screw_thrust_coefficients' has 1 numbers instead of 2"),
         ({"fin_area": "nan"}, "'fin_area' is not finite"),
@@ -155,6 +158,8 @@ def test_equipping_twice_is_equipping_once():
             "'hull_strip_x' has 17 numbers; strip_x and strip_area want as many, <= 16",
         ),
         ({"hull_strip_x": "0 1", "hull_strip_area": "1"}, "'hull_strip_area' has 1 numbers"),
+        ({"screw_astern_loss": "1.2"}, "'screw_astern_loss' is 1.2; it is a share, at most 1"),
+        ({"screw_power_limit": "50", "screw_torque_coefficients": "0 0"}, "'screw_power_limit' needs a positive K_Q0"),
     ],
 )
 def test_a_wrong_field_is_named(fields, expected):
@@ -189,8 +194,8 @@ def test_a_missing_field_is_named(missing, expected):
         ({"hull_joint": "<joint/>"}, "hull 'hull' is not on a body with a free joint (hulls must be fixed to it)"),
         ({"shaft": ""}, "propeller 'screw' needs a shaft: one hinge joint about its x axis"),
         ({"shaft": '<joint type="ball"/>'}, "propeller 'screw' needs a shaft"),
-        ({"size": 'nuser_body="10" nuserdata="19"'}, "hydrodynamics need <size nuser_body='147'>, not 10"),
-        ({"size": 'nuser_body="147"'}, "1 vehicles need <size nuserdata='19'>, not 0"),
+        ({"size": 'nuser_body="10" nuserdata="19"'}, f"hydrodynamics need <size nuser_body='{RECORD}'>, not 10"),
+        ({"size": f'nuser_body="{RECORD}"'}, f"1 vehicles need <size nuserdata='{fluid.WATER}'>, not 0"),
         ({"option": 'density="1000"'}, "option density and viscosity must be 0"),
         ({"option": 'viscosity="0.001"'}, "option density and viscosity must be 0"),
     ],
@@ -218,7 +223,7 @@ def test_a_shaft_that_is_not_a_hinge_about_x_is_refused(shaft):
 def test_a_body_that_mujoco_finds_simple_is_refused():
     def lone(centre):
         return mujoco.MjModel.from_xml_string(
-            '<mujoco><size nuser_body="147" nuserdata="19"/><worldbody><body name="hull"><freejoint/>'
+            f'<mujoco><size nuser_body="{RECORD}" nuserdata="{fluid.WATER}"/><worldbody><body name="hull"><freejoint/>'
             f'<inertial pos="{centre}" mass="1" diaginertia="1 1 1"/></body></worldbody><custom>'
             f'<numeric name="hull_added_mass" data="{text(ADDED)}"/><numeric name="hull_displaced_volume" data="0"/>'
             "</custom></mujoco>"

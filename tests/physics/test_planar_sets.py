@@ -1,4 +1,4 @@
-"""Parameter files: whole and bit for bit, found by name or path, and believed by a trial's estimator."""
+"""Parameter files: whole and bit for bit, found by name or path, and assumed by a trial's estimator."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from auvsim.base import plugins
 from auvsim.base.errors import InputError
-from auvsim.navigation import navigator as navigation
+from auvsim.navigation.estimate import PLANAR_STATES
 from auvsim.physics import planar_sets
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.planar_sets import PlanarSet, Source, coefficients
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import Loop
+from auvsim.simulation.run import Simulation
 from auvsim.vehicles import library
 from estimators.planar.model import PARAMETER_NAMES, PRESTERO, PlanarParameters
 
@@ -119,18 +120,19 @@ def test_a_trial_believes_the_set_it_is_given(tmp_path: Path, monkeypatch: pytes
     """The estimator's factory is handed the file's parameters; start and shaft speed stay those of the vehicle."""
     handed: list[PlanarParameters] = []
 
-    def factory(parameters: PlanarParameters, plan: Any) -> Any:
-        handed.append(parameters)
-        return SimpleNamespace(update=print, reset=print)
+    def factory(setup: Any) -> Any:
+        handed.append(setup.parameters)
+        return SimpleNamespace(update=print, reset=print, states=PLANAR_STATES)
 
-    monkeypatch.setattr(navigation, "find_factory", lambda name: factory)
+    find = plugins.find
+    monkeypatch.setattr(plugins, "find", lambda what, *rest: factory if what == "estimator" else find(what, *rest))
     wrong = replace(fit_planar_model("remus100", 1.0).parameters, X_uu=-1.2345678901234567)
     path = tmp_path / "wrong.yaml"
     planar_sets.write(some_set(wrong), path)
     speeds = []
     for model in ("condense", str(path)):
         plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": model}})
-        loop = Loop(scenario.parse(sampling.draw(plan, 0)), 0, 0)
-        speeds.append(loop._commands.shaft_speed)
+        simulation = Simulation(scenario.parse(sampling.draw(plan, 0)), 0)
+        speeds.append(simulation.agents[0].commands.shaft_speed)
     assert handed == [fit_planar_model("remus100", 1.0).parameters, wrong]
     assert speeds[0] == speeds[1]

@@ -10,7 +10,7 @@ from matplotlib.image import imread
 from scipy.stats import chi2
 
 from auvsim import cli
-from auvsim.navigation.navigator import augmented_ekf
+from auvsim.navigation.docking import augmented_ekf
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.reproduce import paired
 from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
@@ -128,8 +128,7 @@ def test_a_filter_that_knows_all_is_consistent_through_the_trials_sensors():
     total = 0.0
     for seed in range(runs):
         run = simulate(RunConditions(duration=150.0, planar=True, compass_bias=0.0, usbl=NO_BIAS), seed)
-        plan = run.plan.model_copy(update={"estimator": run.plan.estimator.model_copy(update=settings)})
-        followed = track(run, augmented_ekf(run.parameters, plan))
+        followed = track(run, augmented_ekf(run.setup("augmented_ekf", **settings)))
         error = (followed.means[-1] - run.states[-1])[:2]
         total += error @ np.linalg.solve(followed.covariances[-1, :2, :2], error)
     assert chi2.ppf(0.0005, 2 * runs) < total < chi2.ppf(0.9995, 2 * runs)

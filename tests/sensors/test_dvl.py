@@ -8,9 +8,11 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2
+from surroundings import Around
 
 from auvsim.base.frames import euler_to_quaternion
 from auvsim.base.randomness import stream
+from auvsim.base.reading import Reading
 from auvsim.physics.truth import Truth
 from auvsim.sensors.dvl import Dvl, DvlSettings
 from auvsim.water.currents import CurrentField, build_current
@@ -44,14 +46,25 @@ def truth(depth: float = 10.0, current: CurrentField | None = None) -> Truth:
         attitude=np.array(ATTITUDE),
         nu=np.array(NU),
         current=(current or field()).evaluate(7.0, position).velocity,
-        fins=np.zeros(4),
-        shaft_speed=100.0,
+        actuators=np.array((0.0, 0.0, 0.0, 0.0, 100.0)),
     )
 
 
-def log(trial: int = 0, *, floor: float = 40.0, current: CurrentField | None = None, **settings: Any) -> Dvl:
-    """A Doppler log of a trial."""
-    return Dvl(DvlSettings(**settings), stream(5, trial, "remus100/dvl"), current or field(), floor)
+class Pinging(Dvl):
+    """A Doppler log that knows where it is."""
+
+    def __init__(self, settings: DvlSettings, generator: np.random.Generator, around: Around) -> None:
+        super().__init__(settings, generator)
+        self.around = around
+
+    def measure(self, truth: Truth, world: Any = None) -> Reading:
+        """A ping."""
+        return super().measure(truth, self.around)
+
+
+def log(trial: int = 0, *, floor: float = 40.0, current: CurrentField | None = None, **settings: Any) -> Pinging:
+    """A Doppler log of a trial, over its floor in its water."""
+    return Pinging(DvlSettings(**settings), stream(5, trial, "remus100/dvl"), Around(current or field(), floor))
 
 
 def through_water(current: np.ndarray) -> np.ndarray:

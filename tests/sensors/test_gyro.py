@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 from scipy.stats import chi2
+from surroundings import WATER
 
 from auvsim.base.frames import euler_to_quaternion
 from auvsim.base.randomness import stream
@@ -25,8 +26,7 @@ def truth() -> Truth:
         attitude=np.array([0.1, 0.2, 0.3]),
         nu=np.array([1.5, 0.0, 0.0, *RATES]),
         current=np.zeros(3),
-        fins=np.zeros(4),
-        shaft_speed=100.0,
+        actuators=np.array((0.0, 0.0, 0.0, 0.0, 100.0)),
     )
 
 
@@ -37,7 +37,7 @@ def gyro(trial: int = 0, **settings: Any) -> Gyro:
 
 def readings(instance: Gyro, count: int) -> np.ndarray:
     """Errors (count, 3) of as many readings [rad/s]."""
-    return np.array([instance.measure(truth()).value for _ in range(count)]) - RATES
+    return np.array([instance.measure(truth(), WATER).value for _ in range(count)]) - RATES
 
 
 def assert_variance(samples: np.ndarray, sigma: float) -> None:
@@ -48,7 +48,7 @@ def assert_variance(samples: np.ndarray, sigma: float) -> None:
 
 def test_an_exact_gyro_measures_the_rates() -> None:
     """p, q, r of the body."""
-    reading = gyro(noise_density_deg=0.0, bias_deg=0.0, bias_walk_deg=0.0).measure(truth())
+    reading = gyro(noise_density_deg=0.0, bias_deg=0.0, bias_walk_deg=0.0).measure(truth(), WATER)
     assert reading.value.tolist() == list(RATES)
     assert (reading.sensor, reading.stamp, reading.received, reading.sequence) == ("gyro", 3.0, 3.0, 0)
 

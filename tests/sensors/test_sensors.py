@@ -9,14 +9,16 @@ import pytest
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2, kstest
+from surroundings import WATER
 
-from auvsim.acoustics.usbl import DockPose, Usbl, UsblSettings, interpolate
+from auvsim.acoustics.usbl import StructurePose, Usbl, UsblSettings, interpolate
 from auvsim.base.frames import euler_to_quaternion
 from auvsim.base.randomness import stream
 from auvsim.physics.truth import Truth
 from auvsim.sensors.compass import Compass, CompassSettings
 from auvsim.sensors.depth import Depth, DepthSettings
 from auvsim.sensors.feedback import Feedback, FeedbackSettings
+from estimators.docking.usbl import UsblModel
 
 COUNT = 20_000
 DEG = math.pi / 180.0
@@ -28,7 +30,7 @@ EXACT: dict[str, Any] = {
     "dock_depth_noise": 0.0,
     "dock_depth_bias": 0.0,
 }
-DOCK = DockPose(depth=20.0, heading=0.7)
+DOCK = StructurePose(depth=20.0, heading=0.7)
 
 
 def truth(time=0.0, position=(0.0, 0.0, 10.0), attitude=(0.1, -0.2, 0.3), nu=(0.0,) * 6, fins=(0.1, -0.1), shaft=150.0):
@@ -39,8 +41,7 @@ def truth(time=0.0, position=(0.0, 0.0, 10.0), attitude=(0.1, -0.2, 0.3), nu=(0.
         attitude=np.array(attitude),
         nu=np.array(nu),
         current=np.zeros(3),
-        fins=np.array(fins),
-        shaft_speed=shaft,
+        actuators=np.array((*fins, shaft)),
     )
 
 
@@ -65,7 +66,7 @@ def assert_white(samples):
 
 def test_compass_noise_is_white_about_a_constant_bias():
     compass = Compass(CompassSettings(), source())
-    values = np.array([compass.measure(truth()).value for _ in range(COUNT)])
+    values = np.array([compass.measure(truth(), WATER).value for _ in range(COUNT)])
     assert_sd(values[:, 0], 1.0 * DEG, mean=0.3 + compass.heading_bias)
     assert_sd(values[:, 1], 0.5 * DEG, mean=-0.2)  # pitch stands second
     assert_sd(values[:, 2], 0.5 * DEG, mean=0.1)
@@ -82,26 +83,26 @@ def test_biases_vary_from_trial_to_trial_as_set():
 
 def test_compass_heading_is_wrapped():
     compass = Compass(CompassSettings(), source())
-    headings = [compass.measure(truth(attitude=(0.0, 0.0, math.pi))).value[0] for _ in range(200)]
+    headings = [compass.measure(truth(attitude=(0.0, 0.0, math.pi)), WATER).value[0] for _ in range(200)]
     assert all(-math.pi < heading <= math.pi for heading in headings)
     assert min(headings) < -3.0 < 3.0 < max(headings)  # noise of 1 deg about +-180 deg shows on both sides
 
 
 def test_depth_noise_is_white_about_a_constant_bias():
     depth = Depth(DepthSettings(), source())
-    values = [float(depth.measure(truth()).value[0]) for _ in range(COUNT)]
+    values = [float(depth.measure(truth(), WATER).value[0]) for _ in range(COUNT)]
     assert_sd(values, 0.05, mean=10.0 + depth.bias)
     assert_white(values)
 
 
 def test_feedback_is_exact_by_default():
-    reading = Feedback(FeedbackSettings(), source()).measure(truth(fins=(0.1, -0.2, 0.3, 0.0)))
+    reading = Feedback(FeedbackSettings(), source()).measure(truth(fins=(0.1, -0.2, 0.3, 0.0)), WATER)
     assert reading.value.tolist() == [0.1, -0.2, 0.3, 0.0, 150.0]
 
 
 def test_feedback_noise():
     feedback = Feedback(FeedbackSettings(fin_noise_deg=0.2, shaft_noise_rpm=3.0), source())
-    values = np.array([feedback.measure(truth()).value for _ in range(COUNT)])
+    values = np.array([feedback.measure(truth(), WATER).value for _ in range(COUNT)])
     assert_sd(values[:, 0], 0.2 * DEG, mean=0.1)
     assert_sd(values[:, 1], 0.2 * DEG, mean=-0.1)
     assert_sd(values[:, 2], 3.0 * 2 * math.pi / 60, mean=150.0)
@@ -109,7 +110,7 @@ def test_feedback_noise():
 
 def test_feedback_rounds_to_the_encoder_step():
     feedback = Feedback(FeedbackSettings(fin_resolution_deg=1.0, shaft_resolution_rpm=60.0), source())
-    value = feedback.measure(truth(fins=(2.4 * DEG, -2.6 * DEG), shaft=2 * math.pi * 3.4)).value
+    value = feedback.measure(truth(fins=(2.4 * DEG, -2.6 * DEG), shaft=2 * math.pi * 3.4), WATER).value
     assert value == pytest.approx([2.0 * DEG, -3.0 * DEG, 2 * math.pi * 3.0], rel=1e-12)
 
 
@@ -120,9 +121,9 @@ def test_readings_carry_name_stamp_and_sequence_and_replay(sensor, settings):
     runs = []
     for _ in range(2):
         instance = sensor(settings(), source())
-        runs.append([instance.measure(truth(time=0.1 * tick)) for tick in range(700)])  # more than one block
+        runs.append([instance.measure(truth(time=0.1 * tick), WATER) for tick in range(700)])  # more than one block
     for index, (first, again) in enumerate(zip(*runs, strict=True)):
-        assert first.sensor == sensor.name
+        assert first.sensor == sensor.kind
         assert first.stamp == first.received == 0.1 * index
         assert first.sequence == index
         assert np.array_equal(first.value, again.value)
@@ -131,13 +132,13 @@ def test_readings_carry_name_stamp_and_sequence_and_replay(sensor, settings):
 def test_the_size_of_one_noise_changes_no_other_draw():
     loud, quiet = (Compass(CompassSettings(heading_noise_deg=sd, heading_bias_deg=0.0), source()) for sd in (5.0, 0.0))
     for _ in range(100):
-        first, second = loud.measure(truth()).value, quiet.measure(truth()).value
+        first, second = loud.measure(truth(), WATER).value, quiet.measure(truth(), WATER).value
         assert first[0] != second[0]
         assert np.array_equal(first[1:], second[1:])
 
 
 def test_usbl_geometry_leads_back_to_the_vehicle():
-    dock = DockPose(depth=18.0, heading=2.0, pitch=0.05, roll=-0.08)
+    dock = StructurePose(depth=18.0, heading=2.0, pitch=0.05, roll=-0.08)
     settings = UsblSettings(**EXACT, transceiver=(0.3, -0.2, -1.0), transponder=(0.5, 0.1, -0.1))
     state: dict[str, Any] = {"position": (-35.0, 12.0, 14.0), "attitude": (0.2, -0.3, 1.9)}
     pings = Usbl(settings, source(), dock).poll(truth(0.0, **state), truth(50.0, **state))
@@ -155,7 +156,7 @@ def test_usbl_geometry_leads_back_to_the_vehicle():
 def test_usbl_sees_ahead_of_an_east_facing_dock_what_lies_east_of_it():
     settings = UsblSettings(**EXACT, transceiver=(0, 0, 0), transponder=(0, 0, 0))
     state: dict[str, Any] = {"position": (0.0, 10.0, 20.0), "attitude": (0.0, 0.0, 0.0)}
-    usbl = Usbl(settings, source(), DockPose(depth=20.0, heading=math.pi / 2))
+    usbl = Usbl(settings, source(), StructurePose(depth=20.0, heading=math.pi / 2))
     value = usbl.poll(truth(0.0, **state), truth(6.0, **state))[0].reading.value
     assert value[:3] == pytest.approx([10.0, 0.0, 0.0], abs=1e-12)
 
@@ -181,13 +182,17 @@ def test_interpolation_follows_a_turning_circle():
 
 
 def test_usbl_noise_table():
-    usbl = Usbl(UsblSettings(), source(), DOCK)
+    settings = UsblSettings()
     table = {12.0: 0.0067, 40.0: 0.0678, 100.0: 0.3390, 200.0: 0.4807, 3.0: 0.0067, 0.0: 0.0067, 900.0: 0.4807}
     for slant_range, sigma in table.items():
-        assert usbl.sigma(slant_range) == pytest.approx(sigma, rel=1e-12)
-    middle = usbl.sigma(math.sqrt(40.0 * 100.0))
+        assert settings.sigma(slant_range) == pytest.approx(sigma, rel=1e-12)
+    middle = settings.sigma(math.sqrt(40.0 * 100.0))
     assert middle == pytest.approx(math.sqrt(0.0678 * 0.3390), rel=1e-12)  # geometric means: log-log
-    assert Usbl(UsblSettings(noise=((50.0, 0.1),), noise_scale=3.0), source(), DOCK).sigma(7.0) == pytest.approx(0.3)
+    assert UsblSettings(noise=((50.0, 0.1),), noise_scale=3.0).sigma(7.0) == pytest.approx(0.3)
+    # The estimators' own model of the sensor has the same table and interpolation by default.
+    assert [UsblModel().deviation(r) for r in (3.0, 50.0, 150.0, 900.0)] == pytest.approx(
+        [settings.sigma(r) for r in (3.0, 50.0, 150.0, 900.0)], rel=1e-12
+    )
 
 
 def static_pings(settings, position=(-60.0, 0.0, 20.0), until=50_000.0, trial=0, dock=DOCK):
@@ -201,7 +206,7 @@ def test_usbl_noise_is_isotropic_and_white(distance):
     pings = static_pings(UsblSettings(outlier_probability=0.0, transceiver=(0, 0, 0)), position)
     exact = static_pings(UsblSettings(**EXACT, transceiver=(0, 0, 0)), position)
     errors = np.array([p.reading.value[:3] - e.reading.value[:3] for p, e in zip(pings, exact, strict=True)])
-    sigma = Usbl(UsblSettings(), source(), DOCK).sigma(pings[0].slant_range)
+    sigma = UsblSettings().sigma(pings[0].slant_range)
     for axis in range(3):
         assert_sd(errors[:, axis], sigma)
         assert_white(errors[:, axis])
@@ -277,7 +282,7 @@ def test_a_missed_poll_is_refused():
 
 
 def test_dock_errors_are_constant_in_a_trial_and_vary_between_trials():
-    dock = DockPose(depth=20.0, heading=0.7, pitch=0.02, roll=-0.03)
+    dock = StructurePose(depth=20.0, heading=0.7, pitch=0.02, roll=-0.03)
     values = np.array([ping.reading.value for ping in static_pings(UsblSettings(), dock=dock)])
     assert np.all(values[:, 3:6] == values[0, 3:6])
     trials = [static_pings(UsblSettings(dock_depth_noise=0.0), until=5.0, trial=t, dock=dock)[0] for t in range(800)]

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from auvsim.base.errors import InputError
 from auvsim.simulation import environment, scenario
 
 
@@ -27,6 +28,30 @@ def test_random_actions_keep_the_contract(plan):
         steps += 1
     # 20 s at 10 Hz, unless it stumbled into the dock before.
     assert steps == 200 or step.discount == 0.0
+
+
+def test_specs_are_known_before_the_first_reset(plan):
+    """Wrappers of dm_env ask for them at once."""
+    env = environment.load(plan)
+    spec = env.observation_spec()
+    for name, value in env.reset().observation.items():
+        spec[name].validate(np.asarray(value))
+
+
+def test_an_action_that_is_no_number_is_refused(plan):
+    env = environment.load(plan)
+    env.reset()
+    with pytest.raises(InputError, match="three finite fractions"):
+        env.step((0.0, np.nan, 0.1))
+
+
+def test_several_vehicles_or_no_dock_are_refused():
+    two = {"a": {"start": {"north": 0.0, "east": 0.0}}, "b": {"start": {"north": 50.0, "east": 0.0}}}
+    track = {"mission": {"kind": "track"}}
+    with pytest.raises(InputError, match="2 vehicles"):
+        environment.load(scenario.parse({"vehicles": {name: values | track for name, values in two.items()}}))
+    with pytest.raises(InputError, match="no dock"):
+        environment.load(scenario.parse({"vehicles": {"a": two["a"] | track}}))
 
 
 def test_an_episode_is_the_same_again(plan):

@@ -5,41 +5,42 @@ import math
 import numpy as np
 import pytest
 from scipy.stats import chi2
+from surroundings import WATER
 
 from auvsim.acoustics.usbl import Usbl, UsblSettings
 from auvsim.base.frames import rotation
-from auvsim.physics import planar_fit
-from auvsim.physics.truth import DockPose
+from auvsim.physics import planar_fit, scenes
+from auvsim.physics.truth import StructurePose
 from auvsim.physics.world import World
 from auvsim.sensors.compass import Compass, CompassSettings
 from auvsim.sensors.depth import Depth, DepthSettings
 from auvsim.sensors.feedback import Feedback, FeedbackSettings
-from auvsim.simulation import scenario
 from auvsim.simulation.planar_world import PlanarWorld, planar_state, process_noise_increments
 from auvsim.vehicles import library
+from auvsim.vehicles.actuation import Commands
 from auvsim.water.currents import Turning, Uniform
 from auvsim.water.settings import TurningSettings
 from estimators.planar.model import PRESTERO, step_function
 
 RATE = 10.0
 STILL = Uniform((0.0, 0.0, 0.0))
-FINS = library.vehicle("remus100").allocation
+ACTUATION = library.vehicle("remus100").actuation
 RUDDERS = np.radians([0.0, 4.0, -6.0, 2.0, 12.0, 0.0])  # each for 10 s
 
 
 def world(current=STILL, densities=(0.0,) * 8, seed=0, parameters=PRESTERO):
-    made = PlanarWorld(parameters, FINS, current, RATE, np.array(densities), np.random.default_rng(seed))
-    made.place(np.array((3.0, -7.0, 20.0)), 1.0, 0.8, 0.0)
+    made = PlanarWorld("auv", parameters, ACTUATION, current, RATE, np.array(densities), np.random.default_rng(seed))
+    made.place("auv", np.array((3.0, -7.0, 20.0)), 1.0, 0.8, np.zeros(5))
     return made
 
 
 def sail(made, ticks=10):
     """Planar states (k, 8), as often as the world is advanced, over RUDDERS."""
-    states = [planar_state(made.truth())]
+    states = [planar_state(made.truth("auv"))]
     for rudder in np.repeat(RUDDERS, round(10.0 * RATE / ticks)):
-        made.command(rudder, 0.0, 0.0)
+        made.command("auv", ACTUATION.allocate(Commands(rudder, 0.0, 0.0)))
         made.advance(ticks)
-        states.append(planar_state(made.truth()))
+        states.append(planar_state(made.truth("auv")))
     return np.array(states)
 
 
@@ -92,9 +93,9 @@ def test_noise_has_the_variance_asked_for(state):
     squares = 0.0
     for seed in range(seeds):
         made = world(densities=densities, seed=seed, parameters=parameters)
-        made.place(np.array((0.0, 0.0, 20.0)), 0.0, 0.0, 0.0)
+        made.place("auv", np.array((0.0, 0.0, 20.0)), 0.0, 0.0, np.zeros(5))
         made.advance(round(duration * RATE))
-        squares += planar_state(made.truth())[state] ** 2 / (density * duration)
+        squares += planar_state(made.truth("auv"))[state] ** 2 / (density * duration)
     assert chi2.ppf(0.0005, seeds) < squares < chi2.ppf(0.9995, seeds)
 
 
@@ -110,10 +111,10 @@ def test_kicks_are_noise_and_changes_of_the_current():
 
 def test_truth_is_of_one_piece():
     made = world(Uniform((0.3, -0.2, 0.0)), densities=np.full(8, 1e-6))
-    made.command(0.1, 0.05, 60.0)
-    before = made.truth()
+    made.command("auv", ACTUATION.allocate(Commands(0.1, 0.05, 60.0)))
+    before = made.truth("auv")
     made.advance(300)
-    truth = made.truth()
+    truth = made.truth("auv")
     assert (before.time, truth.time, made.time) == (0.0, 30.0, 30.0)
     roll, pitch, yaw = truth.attitude
     assert (roll, pitch, truth.position[2]) == (0.0, 0.0, 20.0)
@@ -125,43 +126,42 @@ def test_truth_is_of_one_piece():
     ground = rotation(*truth.attitude) @ truth.nu[:3]
     through = rotation(0.0, 0.0, yaw) @ (*state[3:5], 0.0)
     assert ground == pytest.approx(through + truth.current, abs=1e-12)
-    assert FINS.effective(truth.fins) == pytest.approx((0.1, 0.05))
-    assert truth.shaft_speed == 60.0
-    made.place(np.zeros(3), 0.5, 1.0, 40.0)
+    assert ACTUATION.effective(truth.actuators) == pytest.approx((0.1, 0.05, 60.0))
+    made.place("auv", np.zeros(3), 0.5, 1.0, (0.0, 0.0, 0.0, 0.0, 40.0))
     assert made.time == 0.0
-    assert planar_state(made.truth()) == pytest.approx((0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.3, -0.2), abs=1e-15)
+    assert planar_state(made.truth("auv")) == pytest.approx((0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.3, -0.2), abs=1e-15)
 
 
 def test_fins_do_not_pass_their_limit():
     made, limited = world(), world()
-    made.command(5.0, 0.0, 0.0)
-    limited.command(FINS.limit, 0.0, 0.0)
+    made.command("auv", ACTUATION.allocate(Commands(5.0, 0.0, 0.0)))
+    limited.command("auv", ACTUATION.allocate(Commands(ACTUATION.fin_limit, 0.0, 0.0)))
     for each in (made, limited):
         each.advance(50)
-    assert planar_state(made.truth()) == pytest.approx(planar_state(limited.truth()), abs=1e-12)
-    assert np.abs(made.truth().fins).max() == pytest.approx(FINS.limit)
+    assert planar_state(made.truth("auv")) == pytest.approx(planar_state(limited.truth("auv")), abs=1e-12)
+    assert np.abs(made.truth("auv").actuators[:-1]).max() == pytest.approx(ACTUATION.fin_limit)
 
 
 def test_the_trials_sensors_measure_it():
     """Without noise they give the state back, the USBL that between two truths."""
     made = world(Uniform((0.3, -0.2, 0.0)))
-    made.command(0.1, 0.0, 50.0)
+    made.command("auv", ACTUATION.allocate(Commands(0.1, 0.0, 50.0)))
     quiet = {"dock_heading_bias_deg": 0.0, "dock_tilt_bias_deg": 0.0, "dock_depth_noise": 0.0, "dock_depth_bias": 0.0}
     settings = UsblSettings(noise_scale=0.0, outlier_probability=0.0, transponder=(0.0, 0.0, 0.0), **quiet)
-    usbl = Usbl(settings, np.random.default_rng(1), DockPose(depth=20.0, heading=0.0))
+    usbl = Usbl(settings, np.random.default_rng(1), StructurePose(depth=20.0, heading=0.0))
     compass = Compass(CompassSettings(heading_noise_deg=0.0, heading_bias_deg=0.0), np.random.default_rng(2))
     depth = Depth(DepthSettings(noise=0.0, bias=0.0), np.random.default_rng(3))
     feedback = Feedback(FeedbackSettings(), np.random.default_rng(4))
-    pings, times, states, truth = [], [], [], made.truth()
+    pings, times, states, truth = [], [], [], made.truth("auv")
     for _ in range(300):
         times.append(truth.time)
         states.append(planar_state(truth))
         made.advance(1)
-        before, truth = truth, made.truth()
+        before, truth = truth, made.truth("auv")
         pings += usbl.poll(before, truth)
-        assert compass.measure(truth).value[0] == pytest.approx(truth.attitude[2], abs=1e-12)
-        assert depth.measure(truth).value[0] == 20.0
-        assert FINS.effective(feedback.measure(truth).value[:-1])[0] == pytest.approx(0.1)
+        assert compass.measure(truth, WATER).value[0] == pytest.approx(truth.attitude[2], abs=1e-12)
+        assert depth.measure(truth, WATER).value[0] == 20.0
+        assert ACTUATION.effective(feedback.measure(truth, WATER).value).rudder == pytest.approx(0.1)
     assert len(pings) >= 5
     for ping in pings:
         measured = ping.reading.value[:2] + np.array(settings.transceiver[:2])
@@ -173,17 +173,17 @@ def test_the_trials_sensors_measure_it():
 def test_it_moves_as_the_vehicle_of_which_its_model_is_condensed():
     """The same calls to both worlds: turns in a current; the tolerance is that of an open-loop minute of a condensed
     model, 2 % of the way and 2 degrees (see test_condense)."""
-    plan, believed = scenario.Scenario(), planar_fit.fit_planar_model("remus100", 1.0)
-    vehicle, pose, current = library.vehicle("remus100"), DockPose(depth=20.0, heading=0.0), Uniform((0.3, -0.2, 0.0))
-    physical = World.build(vehicle, library.dock("dock"), pose, current, plan.world, plan.rates.physics)
-    planar = PlanarWorld(believed.parameters, vehicle.allocation, current, RATE, np.zeros(8), np.random.default_rng(0))
+    fitted, current = planar_fit.fit_planar_model("remus100", 1.0), Uniform((0.3, -0.2, 0.0))
+    physical = World(scenes.scene({"auv": "remus100"}, {}, scenes.WorldSettings(), 100.0), current)
+    planar = PlanarWorld("auv", fitted.parameters, ACTUATION, current, RATE, np.zeros(8), np.random.default_rng(0))
     ends = []
-    for each, rate in ((physical, plan.rates.physics), (planar, RATE)):
-        each.place(np.array((200.0, 0.0, 20.0)), 0.5, 1.0, believed.shaft_speed)
+    for each, rate in ((physical, 100.0), (planar, RATE)):
+        start = ACTUATION.allocate(ACTUATION.at_speed(fitted.shaft_speed))
+        each.place("auv", np.array((200.0, 0.0, 20.0)), 0.5, 1.0, start)
         for rudder in (0.1, -0.15, 0.05, 0.0):
-            each.command(rudder, 0.0, believed.shaft_speed)
+            each.command("auv", ACTUATION.allocate(Commands(rudder, 0.0, fitted.shaft_speed)))
             each.advance(round(15.0 * rate))
-        ends.append(planar_state(each.truth()))
+        ends.append(planar_state(each.truth("auv")))
         assert each.time == pytest.approx(60.0)
     difference = ends[0] - ends[1]
     assert math.hypot(*difference[:2]) < 0.02 * 60.0

@@ -10,8 +10,11 @@ from pydantic import BaseModel
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import rotation
-from auvsim.simulation.sampling import default_plan, draw
-from auvsim.simulation.scenario import Rates, Scenario, from_yaml, parse, start_position, to_yaml
+from auvsim.simulation.sampling import default_plan, draw, merge
+from auvsim.simulation.scenario import Rates, Scenario, from_yaml, parse, to_yaml
+from auvsim.simulation.short import ShortScenario
+
+CURRENTS = "none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, waves, grid, sum"
 
 
 def nested(key: str, value: object) -> dict:
@@ -40,7 +43,7 @@ def message(values: dict, **places: str) -> str:
         ("rates.control", 30, "30 Hz does not divide the physics rate 100 Hz; use 25 or 50 Hz"),
         ("rates.physics", 0, "0 should be greater than 0 (steps of the dynamics [Hz])"),
         ("rates.physics", math.nan, ".nan should be a finite number"),
-        ("duration", math.inf, ".inf should be a finite number (time limit of the trial [s])"),
+        ("duration", math.inf, ".inf should be a finite number (time limit of the run [s])"),
         ("duration", "600", "'600' should be a valid number"),
         ("duration", True, "true should be a valid number"),
         ("vehicle.start.depth", -1.0, "-1.0 should be greater than or equal to 0 (depth [m])"),
@@ -50,7 +53,7 @@ def message(values: dict, **places: str) -> str:
         (
             "current",
             {"speed": 0.2},
-            "kind is not given; there are none, uniform, turning, approach_turn, shear, gust, sum",
+            f"kind is not given; there are {CURRENTS}",
         ),
         ("current.kind", "unifrm", None),
         ("current.terms", None, None),
@@ -61,7 +64,7 @@ def test_bad_values_are_named(key: str, value: object, text: str | None) -> None
     found = message(nested(key, value))
     if text is None:
         assert found.startswith("current: ")
-        assert "there are none, uniform, turning, approach_turn, shear, gust, sum" in found
+        assert f"there are {CURRENTS}" in found
     else:
         assert found.startswith(f"{key}: {text}")
 
@@ -84,15 +87,16 @@ def test_place_is_that_of_the_nearest_key_above() -> None:
 
 def test_every_misspelled_key_is_recognised() -> None:
     """Any key with its last letter doubled is refused, and the right one is suggested."""
-    for key in schema.keys(Scenario):
-        if key.startswith(("current.", "manoeuvre.")):
+    of_kinds = ("current.", "manoeuvre.", "mission.", "estimator.", "control.", "guidance.kind")
+    for key in schema.keys(ShortScenario):
+        if key.startswith(of_kinds):
             continue  # which keys there are depends on the kind
         assert f"unknown key; did you mean {key}?" in message(nested(key + key[-1], 1.0))
 
 
 def test_unknown_key_elsewhere_and_nowhere() -> None:
     """A key at the wrong level is found at the right one; a strange one gets the list."""
-    assert "did you mean vehicle.start.speed or current.speed or manoeuvre.speed?" in message({"speed": 1.0})
+    assert "did you mean vehicle.start.speed or current.speed or " in message({"speed": 1.0})
     assert "there are physics, control, filter, log" in message({"rates": {"zzzzzz": 1.0}})
 
 
@@ -144,7 +148,7 @@ def test_start_is_where_its_range_and_bearing_say(heading_deg: float, bearing_de
     """
     start = {"range": 250.0, "bearing_deg": bearing_deg, "depth": 12.0}
     scenario = parse({"vehicle": {"start": start}, "dock": {"heading_deg": heading_deg}})
-    in_dock_frame = rotation(0.0, 0.0, math.radians(heading_deg)).T @ np.array(start_position(scenario))
+    in_dock_frame = rotation(0.0, 0.0, math.radians(heading_deg)).T @ np.array(scenario.start_position("remus100"))
     bearing = math.radians(bearing_deg)
     # Rounding of a few operations on numbers of 250.
     np.testing.assert_allclose(
@@ -154,10 +158,10 @@ def test_start_is_where_its_range_and_bearing_say(heading_deg: float, bearing_de
 
 def test_commented_yaml_reads_back() -> None:
     """The printed default plan is the default plan, and a definite scenario prints likewise."""
-    text = schema.commented(Scenario, default_plan())
+    text = schema.commented(ShortScenario, default_plan())
     assert yaml_text.read(text).value == default_plan()
-    scenario = Scenario()
-    assert from_yaml(schema.commented(Scenario, scenario.model_dump(mode="json"))) == scenario
+    whole = parse(draw(default_plan(), 3))
+    assert from_yaml(schema.commented(Scenario, whole.model_dump(mode="json"))) == whole
     assert max(map(len, text.splitlines())) <= schema.WIDTH
 
 
@@ -181,7 +185,100 @@ def test_every_key_is_described_and_has_its_unit() -> None:
 
 def test_other_kinds_are_shown() -> None:
     """Every kind of current stands in the text, those not in use as comments that hold their own keys."""
-    text = schema.commented(Scenario, default_plan())
+    text = schema.commented(ShortScenario, default_plan())
     for kind in ("none", "uniform", "turning", "shear", "gust", "sum"):
         assert f"kind: {kind}" in text
     assert "# correlation_time:" in text
+
+
+FLEET = {
+    "structures": {"west": {"east": -200.0, "heading_deg": 30.0}, "east": {"east": 200.0, "depth": 15.0}},
+    "vehicles": {
+        "a": {"start": {"range": 100.0, "bearing_deg": 10.0}, "mission": {"kind": "docking", "dock": "west"}},
+        "b": {
+            "start": {"range": 50.0, "structure": "east"},
+            "mission": {"kind": "track"},
+            "sensors": {"usbl": {"dock": "east"}, "ranger": {"kind": "range", "beacon": [1.0, 2.0, 3.0]}},
+        },
+    },
+}  # fmt: skip
+
+
+def changed(key: str, value: object) -> dict:
+    """FLEET with one dotted key changed."""
+    return merge(FLEET, nested(key, value))
+
+
+def test_the_short_form_is_the_full_one_of_one_vehicle() -> None:
+    """What either says of the same run is the same scenario, to the last key."""
+    short = {
+        "dock": {"depth": 17.0, "heading_deg": 40.0},
+        "vehicle": {"start": {"range": 222.0}},
+        "current": {"kind": "uniform", "speed": 0.2},
+        "estimator": {"kind": "imm", "turn_interval": 99.0},
+        "guidance": {"attempts": 2},
+        "world": {"sea_floor": 33.0, "integrator": "RK4"},
+        "acoustics": {"jitter": 0.2},
+    }
+    full = {
+        "structures": {"dock": {"depth": 17.0, "heading_deg": 40.0}},
+        "vehicles": {
+            "remus100": {
+                "start": {"range": 222.0},
+                "estimator": {"kind": "imm", "turn_interval": 99.0},
+                "mission": {"kind": "docking", "attempts": 2},
+            }
+        },
+        "water": {"sea_floor": 33.0, "current": {"kind": "uniform", "speed": 0.2}},
+        "physics": {"integrator": "RK4"},
+        "network": {"acoustics": {"jitter": 0.2}},
+    }
+    assert parse(short) == parse(full)
+
+
+def test_earlier_forms_are_read() -> None:
+    """An estimator's kind as `factory` with the keys of all kinds, and a start at the top."""
+    old = {"estimator": {"factory": "paper", "compass_deg": 2.0, "current_noise": 1e-6, "turn_interval": 9.0}}
+    assert parse(old) == parse({"estimator": {"kind": "paper", "compass_deg": 2.0}})
+    assert "unknown key" in message({"estimator": {"factory": "paper", "compas_deg": 2.0}})
+    top = {"start": {"range": 77.0}, "vehicle": {"start": {"depth": 9.0}}}
+    assert parse(top) == parse({"vehicle": {"start": {"range": 77.0, "depth": 9.0}}})
+
+
+def test_places_of_a_fleet() -> None:
+    """Starts are seen from the dock that is meant: the mission's, or the one that is named."""
+    fleet = parse(FLEET)
+    direction = math.radians(30.0 + 180.0 + 10.0)
+    expected = (100.0 * math.cos(direction), -200.0 + 100.0 * math.sin(direction), 20.0)
+    np.testing.assert_allclose(fleet.start_position("a"), expected, atol=1e-10)
+    np.testing.assert_allclose(fleet.start_position("b"), (-50.0, 200.0, 20.0), atol=1e-10)
+    assert from_yaml(to_yaml(fleet)) == fleet
+    ranger = fleet.vehicles["b"].sensors.model_dump()["ranger"]
+    assert (ranger["kind"], ranger["beacon"], ranger["noise"]) == ("range", (1.0, 2.0, 3.0), 0.2)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "text"),
+    [
+        ("vehicles.a.mission.dock", "north", "vehicles.a.mission.dock: no structure 'north'; there are west, east"),
+        ("vehicles.b.start.structure", None, "vehicles.b.start.structure: range and bearing are from a structure"),
+        ("vehicles.b.sensors.usbl.dock", "x", "vehicles.b.sensors.usbl.dock: no structure 'x'"),
+        ("vehicles.b.sensors.ranger.noise", -1.0, "vehicles.b.sensors: ranger.noise: -1.0 should be greater than"),
+        ("vehicles.b.sensors.ranger.rate", 3.0, "vehicles.b.sensors.ranger.rate: 3 Hz does not divide the control"),
+        (
+            "vehicles.b.sensors.compas",
+            {"rate": 5.0},
+            "vehicles.b.sensors.compas: unknown key; did you mean vehicles.b.sensors.compass?",
+        ),
+        ("vehicles.b.sensors.sonar", {"kind": "lidar"}, "vehicles.b.sensors: sonar.kind: no sensor 'lidar'"),
+        ("vehicles.a.estimator.kind", "particle", "vehicles.a.estimator: no kind 'particle'; there are augmented_ekf"),
+        ("vehicles.a.estimator.turn_interval", 9.0, "vehicles.a.estimator.turn_interval: unknown key"),
+        ("vehicles.a.start.north", 3.0, "vehicles.a.start: north and east go together"),
+        ("vehicles.a.mission.kind", "dock", "vehicles.a.mission: no kind 'dock'; there are docking, manoeuvre, track"),
+        ("vehicles.a b.model", "remus100", "vehicles.a b: a b should match pattern"),
+        ("vehicle.model", "remus100", "vehicle: unknown key; did you mean vehicles?"),
+    ],
+)
+def test_bad_values_of_a_fleet_are_named(key: str, value: object, text: str) -> None:
+    """With the vehicle that they concern."""
+    assert message(changed(key, value)).startswith(text)

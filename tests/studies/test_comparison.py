@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from auvsim.missions.docking.metrics import estimate_errors
+from auvsim.analysis.estimates import estimate_errors
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import run_trial
-from auvsim.studies.comparison import CELLS, main, run_one, run_study, score, table
+from auvsim.simulation.run import run as run_trial
+from auvsim.studies.comparison import CELLS, Options, run_one, run_study, score, table
 from estimators.core.consistency import interval
 
 SEED = 9  # not among those used for tuning
@@ -69,19 +69,24 @@ def test_the_heading_of_the_interacting_models_is_consistent() -> None:
     """
     means = []
     for trial in range(10):
-        plan = sampling.merge(sampling.default_plan(), {"estimator": {"factory": "imm"}, "duration": 120.0})
-        errors = estimate_errors(run_trial(scenario.parse(sampling.draw(plan, 31, trial)), seed=31, trial=trial))
+        plan = sampling.merge(sampling.default_plan(), {"estimator": {"kind": "imm"}, "duration": 120.0})
+        log = run_trial(scenario.parse(sampling.draw(plan, 31, trial)), seed=31, trial=trial)
+        errors = estimate_errors(log.vehicle())
         free = errors.initialised & (errors.time > 30.0)
         means.append(float(np.mean((errors.heading[free] / errors.sigma[free, 2]) ** 2)))
     low, high = interval(1, samples=10, probability=0.99)
     assert low < np.mean(means) < high
 
 
-def test_command_without_trials(capsys: pytest.CaptureFixture) -> None:
-    """A row of each cell and estimator, and no number where there is none."""
-    main(["--trials", "0", "--estimators", "paper", "imm"])
-    text = capsys.readouterr().out
-    assert all(text.count(name) == len(CELLS) for name in ("paper", "imm"))
+def test_without_trials_there_is_a_row_but_no_number() -> None:
+    """A row of each cell and estimator."""
+    output = io.StringIO()
+    Console(width=140, file=output).print(table(run_study(0, SEED, estimators=("paper", "imm")), SEED))
+    assert all(output.getvalue().count(name) == len(CELLS) for name in ("paper", "imm"))
+
+
+def test_the_command_runs_every_cell_by_default() -> None:
+    assert Options().cells == tuple(CELLS)
 
 
 @pytest.mark.slow

@@ -5,7 +5,7 @@ import io
 import pytest
 from rich.console import Console
 
-from auvsim.studies.held_out import main, run_one, run_study, table
+from auvsim.studies.held_out import run_one, run_study, table
 
 
 def test_one_seed() -> None:
@@ -17,12 +17,6 @@ def test_one_seed() -> None:
     output = io.StringIO()
     Console(width=120, file=output).print(table([found]))
     assert output.getvalue().count(f"{100.0 * found.shares['circle']:.2f} %") >= 3  # the seed, the median, the largest
-
-
-def test_command_has_help(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert "judged on other manoeuvres" in capsys.readouterr().out
 
 
 @pytest.mark.slow

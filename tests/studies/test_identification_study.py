@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from auvsim.studies.identification import Covered, convergence, coverage, main, noisy, run_study, share_inside, table
+from auvsim.studies.identification import Covered, convergence, coverage, noisy, run_study, share_inside, table
 
 
 def test_one_seed_of_each() -> None:
@@ -37,12 +37,6 @@ def test_one_seed_of_each() -> None:
 def test_share_inside_counts() -> None:
     fits = [Covered(scores=np.array(scores), converged=True) for scores in ([0.0, 1.9], [-2.0, 3.0])]
     assert share_inside(fits) == (2, 4)
-
-
-def test_command_has_help(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit):
-        main(["--help"])
-    assert "Coverage, convergence and process noise" in capsys.readouterr().out
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from scipy.stats import chi2
 
 from auvsim.base.errors import InputError
 from auvsim.base.randomness import stream
-from auvsim.water.currents import GUST_CORRELATION, build_current
+from auvsim.water.currents import GUST_CORRELATION, build_current, listeners
 from auvsim.water.settings import ApproachTurnSettings, CurrentSettings, GustSettings
 
 DURATION = 200.0
@@ -259,3 +259,16 @@ def test_approach_turn_derivative() -> None:
     before, now, after = (turning.evaluate(104.0 + k * h, np.zeros(3)) for k in (-1, 0, 1))
     # Central differences of a sine at rate 0.16 rad/s: error below 1e-10.
     np.testing.assert_allclose((after.velocity - before.velocity) / (2 * h), now.derivative, atol=1e-9)
+
+
+def test_only_currents_that_follow_the_approach_listen_to_it():
+    """Alone and inside sums of sums; no other field is bothered."""
+    approach = {"kind": "approach_turn"}
+    assert listeners(field(UNIFORM)) == ()
+    assert listeners(field(SUM)) == ()
+    alone = field(approach)
+    assert listeners(alone) == (alone,)
+    nested = field({"kind": "sum", "terms": [UNIFORM, approach, {"kind": "sum", "terms": [GUST, approach]}]})
+    found = listeners(nested)
+    assert [type(part).__name__ for part in found] == ["ApproachTurn", "ApproachTurn"]
+    assert found[0] is not found[1]

@@ -5,7 +5,10 @@ from dataclasses import dataclass
 
 from auvsim.campaign.report.content import Content, Row
 
-SPEED, DIRECTION, DOCK = "current.speed", "current.direction_deg", "dock.heading_deg"  # columns
+# Columns, of a scenario in the short form or in full.
+SPEED = ("current.speed", "water.current.speed")
+DIRECTION = ("current.direction_deg", "water.current.direction_deg")
+DOCK = "dock.heading_deg"
 SECTORS, FINE_SECTORS = 8, 16  # of direction; fine ones from so many trials of a variant on:
 FINE = 1000
 PER_CELL = 8  # trials that a cell should hold on average
@@ -23,7 +26,7 @@ class Frame:
 
     def direction(self, row: Row) -> float | None:
         """Where the water of a trial flows to [deg]."""
-        direction, zero = row.get(DIRECTION), 0.0 if self.reference is None else row.get(self.reference)
+        direction, zero = _value(row, DIRECTION), 0.0 if self.reference is None else row.get(self.reference)
         return None if direction is None or zero is None else (direction - zero) % 360.0
 
 
@@ -47,7 +50,7 @@ class Cells:
 
     def place(self, row: Row, frame: str) -> str:
         """The cell of a trial as `ring,sector`; empty if it has no speed or direction."""
-        speed, direction = row.get(SPEED), FRAMES[frame].direction(row)
+        speed, direction = _value(row, SPEED), FRAMES[frame].direction(row)
         if speed is None or direction is None:
             return ""
         ring = sum(speed >= edge for edge in self.edges[1:-1])
@@ -64,20 +67,29 @@ class Cells:
 
 
 def frames(content: Content) -> list[str]:
-    """Frames in which some trial has a direction."""
-    return [name for name, frame in FRAMES.items() if any(frame.direction(row) is not None for row in content.rows)]
+    """Frames in which some trial has a direction; that of the dock only where a vehicle docks."""
+    possible = {
+        name: frame for name, frame in FRAMES.items() if not frame.reference or "docking" in content.layout.kinds
+    }
+    return [name for name, frame in possible.items() if any(frame.direction(row) is not None for row in content.rows)]
 
 
 def choose(content: Content) -> Cells | None:
     """Cells as fine as the trials of one variant allow; None where speed and direction are not drawn."""
-    known = [row for row in content.rows if row.get(SPEED) is not None and row.get(DIRECTION) is not None]
-    if len({(row[SPEED], row[DIRECTION]) for row in known}) < 2:
+    pairs = [(_value(row, SPEED), _value(row, DIRECTION)) for row in content.rows]
+    known = [(speed, direction) for speed, direction in pairs if speed is not None and direction is not None]
+    if len(set(known)) < 2:
         return None
     each = len(known) / len(content.variants)
     sectors = FINE_SECTORS if each >= FINE else SECTORS
     rings = min(max(round(each / sectors / PER_CELL), RINGS[0]), RINGS[1])
-    speeds = [row[SPEED] for row in known]
+    speeds = [speed for speed, _ in known]
     return Cells(edges=_edges(min(speeds), max(speeds), rings), sectors=sectors)
+
+
+def _value(row: Row, columns: tuple[str, ...]) -> float | None:
+    """The value of the first of some columns that has one."""
+    return next((row[name] for name in columns if row.get(name) is not None), None)
 
 
 def _edges(low: float, high: float, rings: int) -> tuple[float, ...]:

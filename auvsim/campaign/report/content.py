@@ -1,4 +1,4 @@
-"""What a report is about: the campaign, its trials, and what they come to."""
+"""Content of a report: the campaign, its trials and their statistics."""
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import Any
 
 from auvsim.campaign import folder, statistics, table
+from auvsim.campaign.columns import SUCCESS, Layout
 from auvsim.campaign.statistics import Difference, Nees, Rate
 
-Row = Mapping[str, Any]  # one trial of one variant, as `table.rows` gives it; None where there is no value
+Row = Mapping[str, Any]  # one vehicle of a trial, as `table.rows` gives it; None where there is no value
 
+WORDS = {"docked": "docked", "docked_first": "docked on the first attempt"}  # for columns that say whether
 FILES = ("plan.yaml", "table.csv", "table.parquet", "timings.csv")
 
 
@@ -25,18 +27,38 @@ class Content:
     state: Mapping[str, Any]  # of the campaign: engine, jobs, versions, wall_time [s], complete, stopped
     files: tuple[str, ...]  # beside the report
     drawn: tuple[str, ...]  # columns that differ from trial to trial
+    layout: Layout  # of the table
     rows: Sequence[Row]
     rates: Sequence[Rate]
     differences: Sequence[Difference]
     nees: Sequence[Nees]
 
     def rows_of(self, variant: str) -> list[Row]:
-        """The trials of a variant."""
+        """The trials of a variant, one row for each of its vehicles."""
         return [row for row in self.rows if row["variant"] == variant]
 
+    def trials_of(self, variant: str) -> list[Row]:
+        """The trials of a variant, one row for each: of several vehicles the first's, with the rates of all of them."""
+        if not self.layout.fleet:
+            return self.rows_of(variant)
+        return [
+            {**vehicles[0], **{quantity: statistics.over(all, vehicles, quantity) for quantity in self.layout.rates}}
+            for vehicles in statistics.by_trial(self.rows, variant).values()
+        ]
+
     def rate(self, variant: str, quantity: str) -> Rate:
-        """How often a variant did something, `docked` or `docked_first`."""
+        """How often a variant did something: one of the layout's rates."""
         return next(rate for rate in self.rates if rate.variant == variant and rate.quantity == quantity)
+
+
+def words(quantity: str) -> str:
+    """A column in words."""
+    return WORDS.get(quantity, quantity.replace("_", " "))
+
+
+def negated(quantity: str) -> str:
+    """That a column says no, in words."""
+    return "no success" if quantity == SUCCESS else f"not {words(quantity)}"
 
 
 def read(path: Path) -> Content:
@@ -47,6 +69,7 @@ def read(path: Path) -> Content:
     """
     opened = folder.open_begun(path)
     plan, settings, rows = opened.plan, opened.plan.settings, list(table.rows(opened))
+    layout = plan.layout
     return Content(
         name=settings.name,
         variants=plan.variants,
@@ -55,10 +78,11 @@ def read(path: Path) -> Content:
         state=opened.state,
         files=tuple(name for name in FILES if (path / name).is_file()),
         drawn=plan.drawn,
+        layout=layout,
         rows=rows,
-        rates=statistics.rates(rows, plan.variants),
-        differences=statistics.differences(rows, plan.variants),
-        nees=statistics.consistency(rows, plan.variants),
+        rates=statistics.rates(rows, plan.variants, layout),
+        differences=statistics.differences(rows, plan.variants, layout),
+        nees=statistics.consistency(rows, plan.variants, layout),
     )
 
 

@@ -13,7 +13,7 @@ def section(content: Content) -> Markup:
     """Wall-clock and CPU time of a trial, one line for each variant."""
     rows = []
     for index, name in enumerate(content.variants):
-        trials = content.rows_of(name)
+        trials = content.trials_of(name)
         walls, factors = values(trials, "wall_time"), values(trials, "real_time_factor")
         busy = values(trials, "cpu_time")
         numbers = [quantile(walls, 0.5), quantile(walls, 0.95), quantile(factors, 0.5)]

@@ -5,9 +5,8 @@ from auvsim.campaign.report.content import Content, quantile, values
 from auvsim.campaign.report.markup import Markup, join, note, number, right, table, tag
 from auvsim.campaign.report.success import name_cell
 from auvsim.campaign.statistics import Nees
-from auvsim.data.log import PHASES
 
-PHASES_OF_NEES = ("all", "approach", "final")  # those that docking hangs on
+DECISIVE = ("approach", "final")  # phases that docking hangs on
 CONSISTENT = (
     "NEES: squared error over claimed covariance; 1 is consistent, more is overconfident. Bands hold 95 % of the means "
     "of a consistent filter if each trial counts as one sample, which is wide."
@@ -22,8 +21,12 @@ def section(content: Content) -> Markup:
 
 
 def _errors(content: Content) -> Markup:
-    phases = ["all", *(p for p in PHASES if any(row.get(f"{PREFIX}_{p}") is not None for row in content.rows))]
-    head = ["position rms [m], median trial", *(right(_words(phase)) for phase in phases)]
+    phases = [
+        "all",
+        *(p for p in content.layout.phases if any(row.get(f"{PREFIX}_{p}") is not None for row in content.rows)),
+    ]
+    median = "median of vehicles" if content.layout.fleet else "median trial"
+    head = [f"position rms [m], {median}", *(right(_words(phase)) for phase in phases)]
     rows = []
     for index, name in enumerate(content.variants):
         trials = content.rows_of(name)
@@ -34,7 +37,9 @@ def _errors(content: Content) -> Markup:
 
 
 def _consistency(content: Content) -> Markup | None:
-    found = [n for n in content.nees if n.phase in PHASES_OF_NEES and n.mean > 0.0]
+    decisive = [phase for phase in DECISIVE if phase in content.layout.phases] or content.layout.phases
+    phases = ("all", *decisive)
+    found = [n for n in content.nees if n.phase in phases and n.mean > 0.0]
     if not found:
         return None
     ends = [end for n in found for end in (n.mean, n.low, n.high)]
@@ -42,7 +47,7 @@ def _consistency(content: Content) -> Markup | None:
     scale = Scale(low=low, high=high, start=SIDE, end=WIDTH - SIDE, logarithmic=True)
     heads = ["NEES per axis", right("mean"), "if consistent", tag("th", ruler(scale), scope="col"), ""]
     rows = []
-    for phase in PHASES_OF_NEES:
+    for phase in phases:
         lines = [_nees(content, n, scale) for n in found if n.phase == phase]
         heading = tag("tr", tag("th", _words(phase), scope="rowgroup", colspan=5), class_="group")
         rows += [heading, *lines] if lines else []

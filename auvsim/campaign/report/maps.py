@@ -5,12 +5,12 @@ import math
 
 from auvsim.campaign.report.cells import FRAMES, Cells, frames
 from auvsim.campaign.report.chart import colour, svg
-from auvsim.campaign.report.content import Content, Row
+from auvsim.campaign.report.content import Content, Row, words
 from auvsim.campaign.report.markup import Markup, note, tag
 
 SIZE, HOLE, RADIUS = 330.0, 26.0, 140.0  # [px]
 LETTER = 6.2  # width of a digit of a count [px]
-MEASURES = {"docked": "docked", "first": "docked on the first attempt"}
+MEASURES = ("docked", "first")  # what the page calls the success and the rate next to it
 
 
 def section(content: Content, cells: Cells | None) -> Markup:
@@ -23,8 +23,10 @@ def section(content: Content, cells: Cells | None) -> Markup:
         figures = [_figure(content, cells, frame, index) for index in range(len(content.variants))]
         heading = tag("h3", FRAMES[frame].title)
         drawn.append(tag("div", heading, tag("div", figures, class_="row"), class_=f"frame {frame}"))
-    # Where all docked, the attempt still tells currents apart.
-    measures = dict(reversed(MEASURES.items())) if all(row["docked"] for row in content.rows) else MEASURES
+    rates = dict(zip(MEASURES, content.layout.rates, strict=False))
+    measures = {name: words(quantity) for name, quantity in rates.items()}
+    if all(row[content.layout.success] for row in content.rows):  # another rate may still tell currents apart
+        measures = dict(reversed(measures.items()))
     first = next(iter(measures))
     hint = note("Choose a cell to list its trials.")
     return tag("div", hint, _legend(shown, measures), drawn, id="maps", data_measure=first)
@@ -45,43 +47,55 @@ def _menu(name: str, label: str, options: dict[str, str]) -> Markup:
 def _figure(content: Content, cells: Cells, frame: str, variant: int) -> Markup:
     name = content.variants[variant]
     places: dict[str, list[Row]] = {}
-    for row in content.rows_of(name):
+    for row in content.trials_of(name):
         places.setdefault(cells.place(row, frame), []).append(row)
     parts = [
-        _cell(cells, ring, sector, places[f"{ring},{sector}"], frame, (variant, name))
+        _cell(cells, ring, sector, places[f"{ring},{sector}"], frame, (variant, name), content.layout.rates)
         if f"{ring},{sector}" in places
         else tag("path", d=_outline(cells, ring, sector), class_="empty")
         for ring in range(len(cells.edges) - 1)
         for sector in range(cells.sectors)
     ]
     caption = tag("figcaption", tag("span", class_="swatch"), name, class_=colour(variant))
-    words = f"Success over the current: {name}"
-    drawing = svg(SIZE, SIZE + 20.0, parts, _rim(frame), _ruler(cells), class_="map", aria_label=words)
+    label = f"Success over the current: {name}"
+    drawing = svg(SIZE, SIZE + 20.0, parts, _rim(frame), _ruler(cells), class_="map", aria_label=label)
     return tag("figure", caption, drawing, data_variant=variant)
 
 
-def _cell(cells: Cells, ring: int, sector: int, rows: list[Row], frame: str, variant: tuple[int, str]) -> list[Markup]:
+def _cell(
+    cells: Cells, ring: int, sector: int, rows: list[Row], frame: str, variant: tuple[int, str], rates: tuple[str, ...]
+) -> list[Markup]:
     """A cell that filters, and its counts where there is room for them."""
     index, name = variant
-    total, docked, first = len(rows), *(sum(row[key] for row in rows) for key in ("docked", "docked_first"))
+    shown = list(zip(MEASURES, rates, strict=False))
+    rows = [row for row in rows if row[rates[0]] is not None]
+    total, counted = len(rows), {name: sum(bool(row[quantity]) for row in rows) for name, quantity in shown}
+    said = _said(rates, counted, total)
     label = f"{name}, {cells.label(ring, sector, frame)}"
     path = tag(
         "path",
-        tag("title", f"{label}\ndocked {docked} of {total}, on the first attempt {first}"),
+        tag("title", f"{label}\n{said}"),
         d=_outline(cells, ring, sector),
         class_="cell",
-        style=f"--docked:{100.0 * docked / total:.0f};--first:{100.0 * first / total:.0f}",
+        style=";".join(f"--{name}:{100.0 * count / max(total, 1):.0f}" for name, count in counted.items()),
         data_filter=json.dumps({"v": str(index), frame: f"{ring},{sector}"}),
         data_label=label,
     )
     inner, outer = _radius(cells, ring), _radius(cells, ring + 1)
     x, y = _point((inner + outer) / 2.0, 2.0 * math.pi * sector / cells.sectors)
-    counts = [(f"{docked}/{total}", "docked"), (f"{first}/{total}", "first")]
+    counts = [(f"{count}/{total}", name) for name, count in counted.items()]
     return [path] + [
         tag("text", text, x=round(x, 1), y=round(y + 4.0, 1), text_anchor="middle", class_=f"count {kind}")
         for text, kind in counts
         if _fits(cells, ring, sector, text)
     ]
+
+
+def _said(rates: tuple[str, ...], counted: dict[str, int], total: int) -> str:
+    """The counts of a cell in words."""
+    if rates[:2] == ("docked", "docked_first"):
+        return f"docked {counted['docked']} of {total}, on the first attempt {counted['first']}"
+    return ", ".join(f"{words(rate)} {count} of {total}" for rate, count in zip(rates, counted.values(), strict=False))
 
 
 def _fits(cells: Cells, ring: int, sector: int, text: str) -> bool:

@@ -17,7 +17,7 @@ def section(content: Content) -> Markup:
     found = {name: values(content.rows_of(name), "miss_distance") for name in content.variants}
     every = [value for misses in found.values() for value in misses]
     if not every:
-        return note("No trial came to the dock's mouth.")
+        return note("No trial reached the dock's mouth.")
     figures = tag("div", _curves(content, found), _quantiles(content, found), class_="row")
     return join([note(PASSED), figures])
 

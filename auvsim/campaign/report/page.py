@@ -5,7 +5,7 @@ from typing import Any
 
 from auvsim.campaign.report import cells, cost, estimates, failures, maps, misses, success, trials
 from auvsim.campaign.report.chart import colour
-from auvsim.campaign.report.content import Content
+from auvsim.campaign.report.content import Content, words
 from auvsim.campaign.report.markup import Markup, number, percent, tag
 
 POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
@@ -34,19 +34,24 @@ def html(content: Content) -> str:
 
 def headline(content: Content) -> list[str]:
     """The result in a sentence for each variant, best first."""
-    pairs = [(content.rate(name, "docked"), content.rate(name, "docked_first")) for name in content.variants]
-    pairs.sort(key=lambda pair: [-rate.successes / max(rate.trials, 1) for rate in pair])
-    return [
-        f"{docked.variant} docks in {docked.successes} of {docked.trials} trials "
-        f"({percent(docked.low)} to {percent(docked.high)} %), in {first.successes} on the first attempt."
-        for docked, first in pairs
-    ]
+    quantities = content.layout.rates
+    found = [[content.rate(name, quantity) for quantity in quantities] for name in content.variants]
+    found.sort(key=lambda rates: [-rate.successes / max(rate.trials, 1) for rate in rates])
+    docking = quantities == ("docked", "docked_first")
+    all_of_them = " of all vehicles" if content.layout.fleet else ""
+    said = []
+    for rate, *others in found:
+        first = f"{rate.variant} docks" if docking else f"{rate.variant}: {words(rate.quantity)}{all_of_them}"
+        more = f", in {others[0].successes} on the first attempt" if docking else ""
+        interval = f"{percent(rate.low)} to {percent(rate.high)} %"
+        said.append(f"{first} in {rate.successes} of {rate.trials} trials ({interval}){more}.")
+    return said
 
 
 def facts(content: Content) -> dict[str, str]:
     """What was run, by what, for how long."""
     state, planned = content.state, content.trials * len(content.variants)
-    done = len(content.rows)
+    done = sum(len(content.trials_of(name)) for name in content.variants)
     told = {"trials": f"{done} ({len(content.variants)} × {content.trials})", "seed": str(content.seed)}
     if state.get("stopped") is not None:
         told["stopped"] = f"after {state['stopped']} trials of each variant"
@@ -99,7 +104,9 @@ def _sections(content: Content) -> Markup:
         _section("success", "Success", success.variants_table(content)),
         _section("differences", f"Difference from {content.variants[0]}", success.differences_table(content)),
         _section("map", "Success over the current", maps.section(content, grid)),
-        _section("misses", "Miss distance", misses.section(content)),
+        _section("misses", "Miss distance", misses.section(content))
+        if "miss_distance" in content.layout.columns
+        else None,
         _section("failures", "Failures", failures.section(content)),
         _section("estimates", "Estimates", estimates.section(content)),
         _section("cost", "Cost", cost.section(content)),

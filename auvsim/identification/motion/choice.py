@@ -33,13 +33,13 @@ class Candidate:
 
     structure: Structure
     step: str
-    shares: tuple[Array, ...]  # of each part left out, (s, m): position error by the distance run
+    shares: tuple[Array, ...]  # of each part left out, (s, m): position error relative to the distance run
     deviation: float  # standard error of `error` over the parts
     converged: bool  # all of the fits
 
     @property
     def error(self) -> float:
-        """Position error at the horizon by the distance run, rms."""
+        """Position error at the horizon relative to the distance run, rms."""
         return float(rms(self.shares)[-1])
 
     @property

@@ -34,7 +34,7 @@ class Judged(Settings):
 
     seconds: float = Field(gt=0, description="length of each prediction [s]")
     predictions: int = Field(gt=0, description="how many")
-    share: float = Field(ge=0, description="error of the position at the end by the distance run, rms [-]")
+    share: float = Field(ge=0, description="error of the position at the end relative to the distance run, rms [-]")
     inside: float = Field(ge=0, le=1, description="share of the positions inside their 95 % band [-]")
 
 

@@ -249,7 +249,7 @@ def _blocks(problem: Problem, point: Point) -> list[tuple[Array, Array]]:
     """Information and gradient of each segment, its first state eliminated."""
     k = len(problem.free)
     found = []
-    for H, g in point.folds:
+    for H, g in point.normal_equations:
         for s in range(len(H)):
             part, descent, _, _ = engine.loops().eliminate(H[s : s + 1], g[s : s + 1], 0.0)
             found.append((part[:k, :k], descent[:k]))

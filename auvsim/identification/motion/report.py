@@ -1,11 +1,7 @@
 """Report of a motion model: one self-contained page and one picture; its first line says how far to trust the model."""
 
-import io
-from collections.abc import Iterator, Sequence
-from html import escape
 from pathlib import Path
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -13,10 +9,11 @@ from matplotlib.figure import Figure
 from auvsim.analysis.style import dress
 from auvsim.base.errors import InputError
 from auvsim.base.files import whole
+from auvsim.base.templates import environment
 from auvsim.identification.motion.files import intervals
 from auvsim.identification.motion.identify import MotionIdentification, verdicts
 from auvsim.identification.motion.uncertainty import Held
-from auvsim.identification.report import STYLE
+from auvsim.identification.report import svg
 
 DPI = 120
 
@@ -39,39 +36,21 @@ def write(found: MotionIdentification, folder: Path, stem: str = "report") -> tu
 
 
 def html(found: MotionIdentification) -> str:
-    """The page."""
-    title = f"Motion model of {escape(found.name)}"
-    stream = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "auvsim", "svg.fonttype": "none", "font.family": "sans-serif"}):
-        overview(found).savefig(stream, format="svg", metadata={"Date": None, "Creator": None})
-    picture = stream.getvalue()
-    items = (
-        f'<li class="{"good" if good else "bad"}">{escape(text)}</li>' for good, text in verdicts(found)
-    )  # fmt: skip
-    return "\n".join(
-        (
-            f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{title}</title>',
-            f"<style>{STYLE}</style></head><body><h1>{title}</h1>",
-            f'<ul class="verdicts">{"".join(items)}</ul>',
-            picture[picture.index("<svg") :],
-            "<h2>Horizons</h2>", *_horizons(found),
-            f"<h2>What was compared</h2><p class=small>{escape(found.choice.said)}; position error after "
-            f"{found.choice.horizon:.0f} s by the distance run, and its standard error over the parts.</p>",
-            *_table(("structure", "terms", "step", "error [%]", "standard error [%]", ""), _candidates(found)),
-            "<h2>Coefficients</h2>",
-            *_table(
-                ("term", "value", "95 % interval"),
-                [(t, f"{v:.4g}", f"{low:.4g} to {high:.4g}") for t, v, low, high in intervals(found)],
-            ),
-            "<h2>Data</h2>", *_data(found), "</body></html>\n",
+    """Renders the report as one HTML page."""
+    return (
+        environment("auvsim.identification")
+        .get_template("motion/report.html.j2")
+        .render(
+            found=found,
+            verdicts=verdicts(found),
+            picture=svg(overview(found)),
+            horizons=horizon_rows(found),
+            step_headings=("step", *(f"{s:.0f} s [%]" for s in found.judged.horizons)),
+            steps=[(step, *(f"{100 * e:.2f}" for e in errors)) for step, errors in found.steps],
+            candidates=_candidates(found),
+            coefficients=[(t, f"{v:.4g}", f"{low:.4g} to {high:.4g}") for t, v, low, high in intervals(found)],
         )
-    )  # fmt: skip
-
-
-def _table(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Iterator[str]:
-    yield f"<table><tr>{''.join(f'<th>{escape(h)}</th>' for h in headings)}</tr>"
-    yield from (f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows)
-    yield "</table>"
+    )
 
 
 def horizon_rows(found: MotionIdentification) -> list[tuple[str, ...]]:
@@ -87,24 +66,6 @@ def horizon_rows(found: MotionIdentification) -> list[tuple[str, ...]]:
     ]
 
 
-def _horizons(found: MotionIdentification) -> Iterator[str]:
-    yield from _table(
-        (
-            "after [s]", "predictions", "error [%]", "going on as it began [%]", "95 % band [%]", "it holds [%]",
-            "by coefficients alone [%]",
-        ),
-        horizon_rows(found),
-    )  # fmt: skip
-    yield (
-        '<p class="small">Position error by the distance run, rms. Each prediction begins at the smoothed state and '
-        "takes the record's inputs alone; no bias is fitted. The band is the longer semi-axis of its ellipse.</p>"
-    )
-    if found.steps:
-        yield "<p>Each step of the chosen structure on what was held out:</p>"
-        rows = [(step, *(f"{100 * e:.2f}" for e in errors)) for step, errors in found.steps]
-        yield from _table(("step", *(f"{s:.0f} s [%]" for s in found.judged.horizons)), rows)
-
-
 def _candidates(found: MotionIdentification) -> list[tuple[str, ...]]:
     return [
         (
@@ -113,13 +74,6 @@ def _candidates(found: MotionIdentification) -> list[tuple[str, ...]]:
         )
         for c in found.choice.candidates
     ]  # fmt: skip
-
-
-def _data(found: MotionIdentification) -> Iterator[str]:
-    yield "<ul>"
-    for source in found.readings.sources:
-        yield f"<li>{escape(source.file)} <span class=small>sha256 {source.sha256}</span></li>"
-    yield f'</ul><ul class="small">{"".join(f"<li>{escape(note)}</li>" for note in found.readings.notes)}</ul>'
 
 
 def overview(found: MotionIdentification) -> Figure:
@@ -139,7 +93,7 @@ def growth(axes: Axes, judged: Held, none: np.ndarray) -> None:
     axes.plot(seconds, 100 * judged.share, marker="o", color="#1f5fa8", label="model")
     axes.set_yscale("log")
     axes.legend()
-    dress(axes, "Predictions", "open loop for [s]", "position error by the distance run [%]")
+    dress(axes, "Predictions", "open loop for [s]", "position error relative to the distance run [%]")
 
 
 def _bars(axes: Axes, found: MotionIdentification) -> None:

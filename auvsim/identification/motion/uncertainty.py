@@ -47,10 +47,10 @@ class Held:
     """What bands hold of some predictions."""
 
     horizons: tuple[float, ...]  # [s]
-    share: Array  # (m,) position error by the distance run, rms
+    share: Array  # (m,) position error relative to the distance run, rms
     inside: Array  # (m,) share of the positions inside their band
     parameters_inside: Array  # (m,) the same of the band of the coefficients' covariance alone
-    radius: Array  # (m,) longer semi-axis of the band by the distance run, median
+    radius: Array  # (m,) longer semi-axis of the band relative to the distance run, median
     count: Array  # (m,) predictions
 
 

@@ -1,27 +1,28 @@
-"""A trial's places seen from its dock: along its axis, to starboard of it, below it."""
+"""The dock's frame: positions along the dock's axis, to starboard of it and below it."""
 
 import math
 
 import numpy as np
 
 from auvsim.base.frames import Array
-from auvsim.data.log import TrialLog
+from auvsim.data.log import StructureLog, VehicleLog
 
 
-def nose_position(log: TrialLog) -> Array:
+def nose_position(log: VehicleLog) -> Array:
     """NED positions (n, 3) [m] of the nose at the times of the truth."""
     w, x, y, z = log["truth"]["quaternion"].T
     forward = np.stack([1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)], axis=-1)
-    return log["truth"]["position"] + log.number("vehicle_nose") * forward
+    return log["truth"]["position"] + log.number("nose") * forward
 
 
-def in_dock_frame(log: TrialLog, position: Array) -> Array:
+def in_dock_frame(dock: StructureLog, position: Array) -> Array:
     """NED positions (n, 3) as along track, cross track (to starboard) and down from the centre of the mouth [m]."""
-    heading = log.number("dock_heading")
+    heading, mouth = dock.heading, dock.position
     cos, sin = math.cos(heading), math.sin(heading)
     north, east, down = position.T
+    north, east = north - mouth[0], east - mouth[1]
     along, cross = cos * north + sin * east, cos * east - sin * north
-    return np.stack([along, cross, down - log.number("dock_depth")], axis=-1)
+    return np.stack([along, cross, down - mouth[2]], axis=-1)
 
 
 def to_body(quaternion: Array, vector: Array) -> Array:
@@ -31,8 +32,8 @@ def to_body(quaternion: Array, vector: Array) -> Array:
     return vector + w * twice + np.cross(axis, twice)
 
 
-def funnel_outline(log: TrialLog) -> tuple[Array, Array]:
+def funnel_outline(dock: StructureLog) -> tuple[Array, Array]:
     """Port and starboard outline (3, 2) of the funnel and throat: along and cross track [m]."""
-    mouth, throat, cone = log.number("mouth_radius"), log.number("throat_radius"), log.number("cone_length")
-    starboard = np.array([[0.0, mouth], [cone, throat], [cone + log.number("throat_length"), throat]])
+    mouth, throat, cone = dock.number("mouth_radius"), dock.number("throat_radius"), dock.number("cone_length")
+    starboard = np.array([[0.0, mouth], [cone, throat], [cone + dock.number("throat_length"), throat]])
     return starboard * np.array([1.0, -1.0]), starboard

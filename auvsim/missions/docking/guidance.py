@@ -7,23 +7,29 @@ centre of the mouth.
 """
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
 from enum import IntEnum
-from typing import NamedTuple
+from typing import Any, ClassVar, Literal
 
 from pydantic import Field
 
+from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
-from auvsim.navigation.navigator import Estimate
+from auvsim.control.controller import Setpoints
+from auvsim.data.log import VehicleLog
+from auvsim.data.variables import Variable
+from auvsim.missions.docking.metrics import docking_metrics
+from auvsim.missions.line_of_sight import course_to_line, cross_track, heading_for_course
+from auvsim.missions.mission import Event, Metric, Mission, MissionSetup, Place, Situation
+from auvsim.navigation.estimate import Estimate
 
 CLEAR = 4.0  # distance that the go-around keeps from the entrance [m]
 BESIDE = 3.0  # distance from the axis at which the vehicle would pass the dock [m]
 BACKING = 60.0  # longest time of backing out [s]
-ABEAM = (-5.0, 40.0)  # the way round the dock: along the axis and to either side of it [m]
-BEFORE = 40.0  # distance before the entrance from which nothing is in the way to a gate [m]
+ABEAM = (-5.0, 40.0)  # detour round the dock: along the axis and to either side of it [m]
+BEFORE = 40.0  # distance before the entrance from which the path to a gate is clear [m]
 
 
 class Phase(IntEnum):
@@ -36,13 +42,16 @@ class Phase(IntEnum):
     DOCKED = 4  # the latch holds
     GO_AROUND = 5  # back out and round for another attempt
     ABORTED = 6  # given up
-    MANOEUVRE = 7  # no docking: a manoeuvre for the identification of the vehicle
 
 
-class GuidanceSettings(Settings):
-    """How the vehicle comes in."""
+class DockingSettings(Settings):
+    """Settings of docking: homing, approach, attempts and time limits."""
 
-    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
+    kind: Literal["docking"] = Field(
+        default="docking", description="docking, manoeuvre, track, or package.module:Class"
+    )
+    dock: str | None = Field(default=None, description="name of the structure to dock at; none: the only one")
+    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water while homing to the gate [m/s]")
     approach_speed: float = Field(default=1.0, gt=0, description="speed through the water on the approach [m/s]")
     gate_distance: float = Field(default=200.0, gt=0, description="distance of the gate before the entrance [m]")
     gate_radius: float = Field(default=20.0, gt=0, description="distance at which the gate counts as reached [m]")
@@ -68,31 +77,6 @@ class GuidanceSettings(Settings):
     lost_timeout: float = Field(default=180.0, gt=0, description="time without a fix that ends the trial [s]")
 
 
-class Command(NamedTuple):
-    """What guidance asks of the autopilot."""
-
-    heading: float  # [rad]
-    depth: float  # [m]
-    speed: float  # through the water [m/s]
-
-
-class Event(NamedTuple):
-    """A change of phase or another decision, for the log."""
-
-    time: float  # [s]
-    kind: str
-    text: str
-
-
-@dataclass(frozen=True, kw_only=True)
-class Geometry:
-    """What guidance knows of vehicle and dock."""
-
-    nose: float  # of the vehicle, ahead of its origin [m]
-    mouth_radius: float  # [m]
-    latched: float  # where the latch holds the nose, along the axis from the mouth [m]
-
-
 def approach_course(axis: float, speed: float, current: tuple[float, float], limit: float) -> float:
     """Course over ground of the approach line [rad]: the axis, or turned to keep the heading within `limit` of it.
 
@@ -110,28 +94,47 @@ def approach_course(axis: float, speed: float, current: tuple[float, float], lim
     return math.atan2(speed * math.sin(heading) + current[1], speed * math.cos(heading) + current[0])
 
 
-def heading_for_course(course: float, speed: float, current: tuple[float, float]) -> float:
-    """Heading [rad] whose course over ground is `course` [rad], or the nearest to it in too strong a current."""
-    across = current[1] * math.cos(course) - current[0] * math.sin(course)
-    return course - math.asin(max(-0.95, min(0.95, across / speed)))
+class Docking(Mission):
+    """The phase machine of a docking.
 
-
-class Guidance:
-    """The phase machine of a docking trial.
-
-    Args:
-        settings: distances, speeds, limits.
-        geometry: of vehicle and dock.
+    Raises:
+        InputError: there is no structure to dock at, or several and none is named.
     """
 
-    rudder: float | None = None  # asked for itself [rad]: never, a docking steers by headings
+    Settings = DockingSettings
+    phases = tuple(phase.name.lower() for phase in Phase)
+    variables: ClassVar = {
+        "attempt": Variable((), "int8", "1", "number of the docking attempt, from 1"),
+        "along_track": Variable((), "float64", "m", "estimated distance along the dock axis, < 0 before", "dock"),
+        "cross_track": Variable((), "float64", "m", "estimated distance to starboard of the dock axis", "dock"),
+    }
+    columns: ClassVar = {
+        "docked": Metric("bool", "1", "whether it docked"),
+        "docked_first": Metric("bool", "1", "whether it docked on the first attempt"),
+        "failure_reason": Metric("str", "", "timeout, aborted or diverged; none if docked"),
+        "failure_text": Metric("str", "", "what the log says of it"),
+        "attempts": Metric("int", "1", "attempts to dock"),
+        "time": Metric("float", "s", "of docking, or of the end"),
+        "miss_distance": Metric("float", "m", "of the nose from the dock's axis where it first enters, last attempt"),
+        "cross_track": Metric("float", "m", "its part to starboard"),
+        "vertical": Metric("float", "m", "its part downward"),
+        "heading_error_deg": Metric("float", "deg", "heading less that of the dock, there"),
+        "contact_impulse": Metric("float", "N s", "contact impulse, friction included, until the latch held"),
+        "peak_contact_force": Metric("float", "N", "largest contact force, friction included, until then"),
+    }
+    aftermath = 5.0
 
-    def __init__(self, settings: GuidanceSettings, geometry: Geometry) -> None:
-        self._s, self._g = settings, geometry
+    def __init__(self, setup: MissionSetup) -> None:
+        super().__init__(setup)
+        settings: DockingSettings = setup.settings
+        self.dock = find_dock(settings.dock, setup.structures)
+        self._s, self._nose, self._vehicle = settings, setup.vehicle.nose, setup.name
+        assert self.dock is not None
+        self._mouth_radius, self._latched = self.dock.structure.mouth_radius, self.dock.structure.latched
+        self._mouth = self.dock.pose.north, self.dock.pose.east
         self._limit = math.radians(settings.heading_limit_deg)
         self.phase = Phase.SEARCH
         self.attempt = 1
-        self.events: list[Event] = []
         self.along = self.cross = math.nan  # of the estimate, dock frame [m]
         self.axis = 0.0  # course of the dock's axis [rad], the mean of what the dock reported
         self._axis_sum = (0.0, 0.0)
@@ -139,11 +142,12 @@ class Guidance:
         self._last_fix = 0.0
         self._certain = 0.0  # when the position across the axis was last known better than the mouth's radius
         self._hold: tuple[float, float] | None = None  # heading and depth held in search
-        self._north = self._east = math.nan  # of the nose [m]
+        self._north = self._east = math.nan  # of the nose, from the mouth [m]
         self._current = (0.0, 0.0)  # north, east [m/s]
         self._side = 1.0  # on which the dock is passed: 1 to starboard of its axis
-        self._leg = 1  # of the way to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
+        self._leg = 1  # of the path to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
         self._phase_start = 0.0
+        self._occupant: str | None = None  # another vehicle in the dock, as reported in its packets
 
     @property
     def dock_depth(self) -> float:
@@ -151,11 +155,29 @@ class Guidance:
         return self._depth_sum / max(self._fixes, 1)
 
     @property
-    def finished(self) -> bool:
-        """Whether nothing more will be tried."""
-        return self.phase in (Phase.DOCKED, Phase.ABORTED)
+    def at_rest(self) -> bool:
+        """Whether the latch holds the vehicle."""
+        return self.phase == Phase.DOCKED
 
-    def observe(self, readings: Sequence[Reading]) -> None:
+    @property
+    def approach(self) -> int | None:
+        """Number of the attempt whose approach is under way."""
+        return self.attempt if self.phase in (Phase.APPROACH, Phase.FINAL) else None
+
+    def row(self) -> tuple[Any, ...]:
+        """Attempt, distance along the dock's axis and across it, as estimated."""
+        return self.attempt, self.along, self.cross
+
+    def overdue(self, duration: float) -> str:
+        """Says that it has not docked in time."""
+        return f"not docked within {duration:g} s"
+
+    @classmethod
+    def metrics(cls, log: VehicleLog) -> dict[str, Any]:
+        """What a docking is judged by, see `docking.metrics`."""
+        return docking_metrics(log)
+
+    def _observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's reports among `readings`."""
         for reading in readings:
             if reading.sensor == "usbl" and all(map(math.isfinite, reading.value.tolist())):
@@ -166,28 +188,33 @@ class Guidance:
                 self._fixes += 1
                 self._last_fix = max(self._last_fix, reading.received)
 
-    def update(self, time: float, estimate: Estimate | None, heading: float, depth: float, latched: bool) -> Command:
-        """The command now.
+    def update(self, now: Situation) -> Setpoints:
+        """The setpoints now."""
+        self._observe(now.readings)
+        for delivery in now.messages:
+            if delivery.message.kind == "usbl" and delivery.message.payload.occupant not in (None, self._vehicle):
+                self._occupant = delivery.message.payload.occupant
+        setpoints = self._decide(now)
+        self.finished = self.phase in (Phase.DOCKED, Phase.ABORTED)
+        return setpoints
 
-        Args:
-            time: [s].
-            estimate: the last one, or None before there is any.
-            heading: smoothed compass heading [rad].
-            depth: smoothed depth [m].
-            latched: whether the dock's latch holds the vehicle.
-        """
+    def _decide(self, now: Situation) -> Setpoints:
+        time, estimate, heading, depth = now.time, now.estimate, now.heading, now.depth
         if self._hold is None:
             self._hold = (heading, depth)
-        if latched and self.phase != Phase.DOCKED:
+        if now.latched and self.phase != Phase.DOCKED:
             self._enter(Phase.DOCKED, time, "latched")
         if self.phase in (Phase.DOCKED, Phase.ABORTED):
-            return Command(heading, depth, 0.0)
+            return Setpoints(heading, depth, 0.0)
+        if self._occupant is not None:
+            self._enter(Phase.ABORTED, time, f"the dock is occupied by '{self._occupant}'")
+            return Setpoints(heading, depth, 0.0)
         silence = time - self._last_fix
         if silence > self._s.lost_timeout:
             self._enter(Phase.ABORTED, time, f"no fix for {silence:.0f} s")
-            return Command(heading, depth, 0.0)
+            return Setpoints(heading, depth, 0.0)
         if estimate is None or not estimate.initialised or not self._fixes:
-            return Command(*self._hold, self._s.approach_speed)
+            return Setpoints(*self._hold, self._s.approach_speed)
         self._locate(time, estimate, heading)
         if self.phase == Phase.SEARCH:
             self._enter(Phase.HOMING, time, "first fix")
@@ -205,8 +232,8 @@ class Guidance:
         u, v, _ = estimate.velocity.tolist()
         current_north, current_east = estimate.current.tolist()
         cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
-        north = north + (u * cos - v * sin + current_north) * dt + self._g.nose * cos
-        east = east + (u * sin + v * cos + current_east) * dt + self._g.nose * sin
+        north = north + (u * cos - v * sin + current_north) * dt + self._nose * cos - self._mouth[0]
+        east = east + (u * sin + v * cos + current_east) * dt + self._nose * sin - self._mouth[1]
         cos, sin = math.cos(self.axis), math.sin(self.axis)
         self.along = north * cos + east * sin
         self.cross = east * cos - north * sin
@@ -216,15 +243,15 @@ class Guidance:
         self.events.append(Event(time, phase.name.lower(), reason))
         self.phase, self._phase_start = phase, time
 
-    def _to(self, x: float, y: float) -> Command:
+    def _to(self, x: float, y: float) -> Setpoints:
         """Straight to a point of the dock frame, crabbing against the current."""
         axis, speed = self.axis, self._s.homing_speed
         target_north = x * math.cos(axis) - y * math.sin(axis)
         target_east = x * math.sin(axis) + y * math.cos(axis)
         course = math.atan2(target_east - self._east, target_north - self._north)
-        return Command(heading_for_course(course, speed, self._current), self.dock_depth, speed)
+        return Setpoints(heading_for_course(course, speed, self._current), self.dock_depth, speed)
 
-    def _to_gate(self, time: float, x: float, y: float) -> Command:
+    def _to_gate(self, time: float, x: float, y: float) -> Setpoints:
         """To a gate of the dock frame, from beside or behind the dock first round it."""
         abeam_x, abeam_y = ABEAM[0], self._side * ABEAM[1]
         if self.along < -BEFORE or math.hypot(self.along - abeam_x, self.cross - abeam_y) < 15.0:
@@ -235,22 +262,22 @@ class Guidance:
             self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
         return self._to(x, y)
 
-    def _follow_line(self) -> Command:
+    def _follow_line(self) -> Setpoints:
         """Along the approach line, by line of sight."""
         speed = self._s.approach_speed
         line = approach_course(self.axis, speed, self._current, self._limit)
         # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
-        error = self._east * math.cos(line) - self._north * math.sin(line)
-        course = line - math.atan2(error, self._s.lookahead)
-        return Command(heading_for_course(course, speed, self._current), self.dock_depth, speed)
+        error = cross_track(line, self._north, self._east)
+        course = course_to_line(line, error, self._s.lookahead)
+        return Setpoints(heading_for_course(course, speed, self._current), self.dock_depth, speed)
 
     def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
         """What is wrong with this attempt; enters the last metres when they begin."""
-        s, g = self._s, self._g
-        (north, both), (_, east) = estimate.covariance[:2, :2].tolist()
+        s = self._s
+        (north, both), (_, east) = estimate.horizontal_covariance.tolist()
         cos, sin = math.cos(self.axis), math.sin(self.axis)
         variance = sin * sin * north - 2 * sin * cos * both + cos * cos * east  # across the axis
-        if variance <= g.mouth_radius**2:
+        if variance <= self._mouth_radius**2:
             self._certain = time
         if self.phase == Phase.APPROACH and self.along > -s.final_distance:
             self._enter(Phase.FINAL, time, f"{-self.along:.0f} m before the entrance, {self.cross:+.2f} m off the axis")
@@ -260,34 +287,34 @@ class Guidance:
             return None
         if time - self._certain > s.uncertain_timeout:
             return f"off-axis position uncertain by more than the mouth's radius for {time - self._certain:.0f} s"
-        if self.along > -0.5 and abs(self.cross) > g.mouth_radius + 0.5:
+        if self.along > -0.5 and abs(self.cross) > self._mouth_radius + 0.5:
             return f"entrance missed by {abs(self.cross):.2f} m"
-        if self.along > g.latched + 1.5:
+        if self.along > self._latched + 1.5:
             return "entrance passed without capture"
-        patience = 3.0 * (s.final_distance + g.latched) / s.approach_speed
+        patience = 3.0 * (s.final_distance + self._latched) / s.approach_speed
         if time - self._phase_start > patience:
             return f"not captured within {patience:.0f} s of the last metres"
         return None
 
-    def _break_off(self, time: float, reason: str, off: float) -> Command:
+    def _break_off(self, time: float, reason: str, off: float) -> Setpoints:
         """Ends an attempt at a heading `off` the axis [rad]."""
         if self.attempt >= self._s.attempts:
             self._enter(Phase.ABORTED, time, f"{reason}; attempt {self.attempt} was the last")
-            return Command(self.axis, self.dock_depth, 0.0)
+            return Setpoints(self.axis, self.dock_depth, 0.0)
         self.attempt += 1
         self._side = math.copysign(1.0, self.cross)
         self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} follows")
         # In or close before the funnel back out first; beside or behind it, or far off, go round at once.
         room = -CLEAR - self._s.turning_radius
-        self._leg = 0 if room < self.along < self._g.latched + 0.5 and abs(self.cross) < BESIDE else 1
+        self._leg = 0 if room < self.along < self._latched + 0.5 and abs(self.cross) < BESIDE else 1
         return self._go_around(time, off)
 
-    def _go_around(self, time: float, off: float) -> Command:
+    def _go_around(self, time: float, off: float) -> Setpoints:
         """Back out of the funnel, then round to a gate abeam of the axis."""
         s = self._s
         if self._leg == 0:
             if time - self._phase_start < BACKING and not self._has_room(off):
-                return Command(self.axis, self.dock_depth, -0.8 * s.approach_speed)
+                return Setpoints(self.axis, self.dock_depth, -0.8 * s.approach_speed)
             self._leg = 1
         return self._to_gate(time, -s.retry_distance, 0.5 * self._side * ABEAM[1])
 
@@ -300,3 +327,19 @@ class Guidance:
         self._side = math.copysign(1.0, self.cross + radius * math.sin(off))
         turned = max(-math.pi / 2, min(math.pi / 2, self._side * off))
         return abs(self.cross) > radius or self.along < -CLEAR - radius * (1.0 - math.sin(turned))
+
+
+def find_dock(name: str | None, structures: Mapping[str, Place]) -> Place:
+    """The structure of a name, or the only one.
+
+    Raises:
+        InputError: there is none of that name; none at all; or several, and none is named.
+    """
+    if name is not None:
+        if name not in structures:
+            raise unknown_name("structure", name, list(structures))
+        return structures[name]
+    if len(structures) != 1:
+        known = f"name one of {', '.join(structures)}" if structures else "there is no structure"
+        raise InputError(f"mission docking: no dock is given; {known}")
+    return next(iter(structures.values()))

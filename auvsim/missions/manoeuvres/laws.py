@@ -6,15 +6,13 @@ excitations: multisine, pseudo-random binary sequence, any table.
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import wrap
-from auvsim.base.reading import Reading
-from auvsim.missions.docking.guidance import Command, Event, Phase
 from auvsim.missions.manoeuvres.settings import (
     CircleSettings,
     ManoeuvreSettings,
@@ -28,7 +26,6 @@ from auvsim.missions.manoeuvres.settings import (
     TableSettings,
     ZigzagSettings,
 )
-from auvsim.navigation.navigator import Estimate
 
 # Feedback of registers whose sequence is as long as can be (Golomb 1967; as in MATLAB's idinput and most tables).
 TAPS = {3: (3, 2), 4: (4, 3), 5: (5, 3), 6: (6, 5), 7: (7, 6), 8: (8, 6, 5, 4), 9: (9, 5), 10: (10, 7), 11: (11, 9)}
@@ -38,7 +35,7 @@ Law = Callable[[float, float], float | None]
 
 
 class Order(NamedTuple):
-    """What a manoeuvre asks for now."""
+    """Rudder or course, and speed, that a manoeuvre demands now."""
 
     course: float  # that is held where there is no rudder [rad]
     rudder: float | None  # effective rudder, positive to starboard [rad]
@@ -81,7 +78,7 @@ def speeds(settings: ManoeuvreSettings) -> set[float]:
 
 
 class Steering:
-    """A manoeuvre as orders in time.
+    """Steers a manoeuvre: gives its orders in time.
 
     Args:
         settings: the manoeuvre.
@@ -221,30 +218,3 @@ def binary_sequence(order: int) -> list[int]:
         sequence.append(2 * register[-1] - 1)
         register = [sum(register[tap - 1] for tap in TAPS[order]) % 2, *register[:-1]]
     return sequence
-
-
-class Manoeuvring:
-    """Stands in for the guidance to a dock: orders of a manoeuvre at a depth."""
-
-    def __init__(self, steering: Steering, depth: float) -> None:
-        self._steering, self._depth = steering, depth
-        self._part = ""
-        self.phase, self.attempt = Phase.MANOEUVRE, 1
-        self.along = self.cross = math.nan  # there is no dock to come to
-        self.rudder: float | None = None  # asked for itself [rad]; None: that which holds the heading
-        self.events: list[Event] = []
-        self.finished = False
-
-    def observe(self, readings: Sequence[Reading]) -> None:
-        """Takes nothing: the heading is given with each update."""
-
-    def update(self, time: float, estimate: Estimate | None, heading: float, depth: float, latched: bool) -> Command:
-        """The command now, from time and smoothed compass heading alone; see `Guidance.update`."""
-        order = self._steering.order(time, heading)
-        if order.part != self._part:
-            self._part = order.part
-            self.events.append(Event(time, "manoeuvre", order.part))
-        self.finished = time >= self._steering.duration - 1e-9
-        course = order.course if order.rudder is None else math.nan
-        self.rudder = order.rudder
-        return Command(course, self._depth, order.speed)

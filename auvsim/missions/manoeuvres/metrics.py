@@ -1,62 +1,70 @@
-"""What engineers read off a manoeuvre: pure functions of a log's truth, relative to the water.
+"""Metrics of manoeuvres (ITTC, IMO): pure functions of a log's truth, relative to the water.
 
 Definitions: IMO MSC.137(76) and MSC/Circ.1053, ITTC 7.5-02-06-01. The track is that through the water, so that a
 current, which those trials are corrected for, does not matter.
 """
 
+import json
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
+from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
-from auvsim.data.log import TrialLog
+from auvsim.data.log import VehicleLog
 from auvsim.missions.docking.dock_frame import to_body
-from auvsim.missions.docking.guidance import Phase
-from auvsim.missions.manoeuvres import laws as manoeuvres
+from auvsim.missions.manoeuvres import laws
 from auvsim.missions.manoeuvres.settings import (
     CircleSettings,
+    ManoeuvreMissionSettings,
     ManoeuvreSettings,
     Simple,
     SpiralSettings,
     StraightSettings,
     ZigzagSettings,
 )
-from auvsim.simulation import scenario
+from auvsim.missions.mission import Metric
 
 STEADY = 0.25  # last share of a held rudder or speed over which it counts as steady
 
-# What a number is called in a table, with its unit; `figures` gives those that a manoeuvre has.
-LABELS = {
-    "duration": "duration after the approach [s]",
-    "approach_speed": "speed at the end of the approach [m/s]",
-    "rudder_deg": "largest rudder [deg]",
-    "mean_speed": "mean surge [m/s]",
-    "largest_yaw_rate_deg": "largest yaw rate [deg/s]",
-    "largest_drift_deg": "largest drift angle [deg]",
-    "largest_depth_error": "largest deviation from the depth [m]",
-    "room": "largest distance from the start [m]",
-    "switch_deg": "switching angle [deg]",
-    "initial_turning_time": "initial turning time [s]",
-    "first_overshoot_deg": "first overshoot [deg]",
-    "second_overshoot_deg": "second overshoot [deg]",
-    "mean_overshoot_deg": "mean overshoot [deg]",
-    "period": "period [s]",
-    "advance": "advance [m]",
-    "transfer": "transfer [m]",
-    "tactical_diameter": "tactical diameter [m]",
-    "steady_diameter": "steady turning diameter [m]",
-    "steady_yaw_rate_deg": "steady yaw rate [deg/s]",
-    "steady_drift_deg": "steady drift angle [deg]",
-    "speed_loss": "speed loss in the turn [%]",
-    "slope": "yaw rate per rudder at zero [1/s]",
-    "residual_yaw_rate_deg": "yaw rate at zero rudder [deg/s]",
-    "loop_deg": "largest difference between the ways [deg/s]",
-    "slowest": "steady surge at the lowest shaft speed [m/s]",
-    "fastest": "steady surge at the highest shaft speed [m/s]",
+NUMBERS: Mapping[str, Metric] = {  # what `figures` may give of a manoeuvre
+    "duration": Metric("float", "s", "duration after the approach"),
+    "approach_speed": Metric("float", "m/s", "speed at the end of the approach"),
+    "rudder_deg": Metric("float", "deg", "largest rudder"),
+    "mean_speed": Metric("float", "m/s", "mean surge"),
+    "largest_yaw_rate_deg": Metric("float", "deg/s", "largest yaw rate"),
+    "largest_drift_deg": Metric("float", "deg", "largest drift angle"),
+    "largest_depth_error": Metric("float", "m", "largest deviation from the depth"),
+    "room": Metric("float", "m", "largest distance from the start"),
+    "switch_deg": Metric("float", "deg", "switching angle"),
+    "initial_turning_time": Metric("float", "s", "initial turning time"),
+    "first_overshoot_deg": Metric("float", "deg", "first overshoot"),
+    "second_overshoot_deg": Metric("float", "deg", "second overshoot"),
+    "mean_overshoot_deg": Metric("float", "deg", "mean overshoot"),
+    "period": Metric("float", "s", "period"),
+    "advance": Metric("float", "m", "advance"),
+    "transfer": Metric("float", "m", "transfer"),
+    "tactical_diameter": Metric("float", "m", "tactical diameter"),
+    "steady_diameter": Metric("float", "m", "steady turning diameter"),
+    "steady_yaw_rate_deg": Metric("float", "deg/s", "steady yaw rate"),
+    "steady_drift_deg": Metric("float", "deg", "steady drift angle"),
+    "speed_loss": Metric("float", "%", "speed loss in the turn"),
+    "slope": Metric("float", "1/s", "yaw rate per rudder at zero"),
+    "residual_yaw_rate_deg": Metric("float", "deg/s", "yaw rate at zero rudder"),
+    "loop_deg": Metric("float", "deg/s", "largest difference between the ways"),
+    "slowest": Metric("float", "m/s", "steady surge at the lowest shaft speed"),
+    "fastest": Metric("float", "m/s", "steady surge at the highest shaft speed"),
+}
+LABELS = {key: f"{number.meaning} [{number.units}]" for key, number in NUMBERS.items()}
+COLUMNS: Mapping[str, Metric] = {  # of `manoeuvre_metrics`
+    "finished": Metric("bool", "1", "whether it went on to its end"),
+    **NUMBERS,
 }
 
 
@@ -75,61 +83,75 @@ class Motion:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Figures:
-    """The numbers of one manoeuvre of a log, by the keys of LABELS; None where it did not get so far."""
+    """The numbers of one manoeuvre of a log, by the keys of NUMBERS; None where it did not get so far."""
 
     kind: str
     start: float  # end of its approach [s]
     numbers: dict[str, float | None]
 
 
-def is_manoeuvre(log: TrialLog) -> bool:
-    """Whether a log is that of a manoeuvre instead of a docking trial."""
-    return bool((log["guidance"]["phase"] == Phase.MANOEUVRE).any())
+def is_manoeuvre(log: VehicleLog) -> bool:
+    """Whether a vehicle performed a manoeuvre."""
+    return log.mission == "manoeuvre"
 
 
-def settings(log: TrialLog) -> ManoeuvreSettings:
-    """What manoeuvre a log is of.
+def settings(log: VehicleLog) -> ManoeuvreSettings:
+    """The manoeuvre that a vehicle performed.
+
+    Logs of formats 1 and 2 say it in their scenario alone, which was of one vehicle.
 
     Raises:
-        InputError: it is that of a docking trial.
+        InputError: it did something else, or what the log says of it cannot be read.
     """
-    found = scenario.from_yaml(str(log.attributes["scenario"]), "the log's scenario").manoeuvre
-    if found is None:
-        raise InputError("the log is that of a docking trial, not of a manoeuvre")
-    return found
+    if not is_manoeuvre(log):
+        raise InputError(f"the mission of '{log.name}' is {log.mission}, not a manoeuvre")
+    where = f"log, mission of '{log.name}'"
+    name = "mission_settings" if "mission_settings" in log.attributes else "scenario"
+    found = yaml_text.read(str({**log.log.attributes, **log.attributes}[name]), where).value
+    values = found.get("manoeuvre") if isinstance(found, Mapping) else None
+    try:
+        return ManoeuvreMissionSettings.model_validate_json(json.dumps({"manoeuvre": values}), strict=True).manoeuvre
+    except ValidationError as error:
+        raise schema.explain(error, ManoeuvreMissionSettings, {"manoeuvre": values}, {"": where}) from None
 
 
-def parts(log: TrialLog) -> list[manoeuvres.Part]:
+def parts(log: VehicleLog) -> list[laws.Part]:
     """The manoeuvres of a log, several for a sequence.
 
     Raises:
-        InputError: it is that of a docking trial.
+        InputError: the vehicle did something else.
     """
-    return list(manoeuvres.parts(settings(log)))
+    return list(laws.parts(settings(log)))
 
 
-def summary(log: TrialLog) -> dict[str, Any]:
-    """Plain values for strict JSON: how the log ended, and the figures of each manoeuvre in it."""
-    found = [{"kind": f.kind, "start": f.start, **f.numbers} for f in figures(log)]
-    return {"status": log.attributes["status"], "manoeuvres": found}
+def manoeuvre_metrics(log: VehicleLog) -> dict[str, Any]:
+    """Values of COLUMNS, each from the first manoeuvre of a sequence that has it, and the figures of every one."""
+    found = figures(log)
+    numbers = {key: next((f.numbers[key] for f in found if key in f.numbers), None) for key in NUMBERS}
+    end = float(log["mission"]["time"].max(initial=0.0))
+    return {
+        "finished": end >= settings(log).duration - 1e-6,
+        **numbers,
+        "manoeuvres": [{"kind": f.kind, "start": f.start, **f.numbers} for f in found],
+    }
 
 
-def figures(log: TrialLog) -> list[Figures]:
-    """What can be read off each manoeuvre of a log.
+def figures(log: VehicleLog) -> list[Figures]:
+    """Figures of each manoeuvre of a log.
 
     Raises:
-        InputError: it is that of a docking trial.
+        InputError: the vehicle did something else.
     """
     found = []
     for start, part in parts(log):
         moved = motion(log, start + part.approach, start + part.duration)
         if len(moved.time) > 1:
             numbers = _common(moved) | _particular(part, moved)
-            found.append(Figures(kind=manoeuvres.name(part), start=start + part.approach, numbers=numbers))
+            found.append(Figures(kind=laws.name(part), start=start + part.approach, numbers=numbers))
     return found
 
 
-def motion(log: TrialLog, start: float, end: float) -> Motion:
+def motion(log: VehicleLog, start: float, end: float) -> Motion:
     """The motion between two times [s], relative to place and heading at the first."""
     truth = log["truth"]
     part = (truth["time"] >= start - 1e-6) & (truth["time"] <= end + 1e-6)
@@ -156,7 +178,7 @@ def motion(log: TrialLog, start: float, end: float) -> Motion:
     )
 
 
-def _course(log: TrialLog, start: float) -> float:
+def _course(log: VehicleLog, start: float) -> float:
     """Heading of the approach [rad]: the mean of its last 5 s, which its autopilot spends near the course."""
     truth = log["truth"]
     before = (truth["time"] > start - 5.0) & (truth["time"] <= start + 1e-6)

@@ -4,20 +4,20 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from typing import Any
 
 import numpy as np
 
-from auvsim.navigation import navigator as navigation
-from auvsim.navigation.navigator import Navigator
-from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks, score_tasks, scores
-from auvsim.reproduce.paper1.mujoco_runs import Recording, RunConditions, simulate, track
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.navigation import docking
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.reproduce.paired import results, run_seed, score_tasks, scores
+from auvsim.reproduce.paper1.mujoco_runs import RunConditions, RunRecord, simulate, track
 from auvsim.reproduce.paper1.runs import TICK
 from auvsim.reproduce.paper1.study import AFTER, FILTERS, Result, Row, Score
 from auvsim.reproduce.paper1.yardsticks import along, mean_square
-from auvsim.simulation.scenario import Scenario
 from estimators.docking.estimator import PAPER_NOISE, PaperFilter
 from estimators.docking.models import DockingNoise, PlanarModels
-from estimators.planar.model import PlanarParameters
 
 # Settled rows are many short runs, because what errs there most, the compasses, errs alike throughout a run.
 SETTLED, STEADY, TURN = RunConditions(duration=400.0), RunConditions(), RunConditions(turn=(120.0, 130.0))
@@ -51,41 +51,41 @@ ROWS: dict[str, Row[RunConditions]] = {
         ("jitter", "a fix every 3 to 8 s", AFTER, replace(STEADY, interval=(3.0, 8.0))),
         ("outliers", "10 % outliers of 10 to 30 m", AFTER, replace(STEADY, usbl={"outlier_probability": 0.1})),
         ("small_outliers", "10 % outliers of 1 to 3 m", AFTER, replace(STEADY, usbl=_SMALL)),
-        ("thrust", "X_nn believed 10 % too large", AFTER, replace(STEADY, thrust=1.0 / 1.1)),
+        ("thrust", "X_nn assumed 10 % too large", AFTER, replace(STEADY, thrust=1.0 / 1.1)),
         ("compass", "compass 2 degrees off", AFTER, replace(STEADY, compass_bias=math.radians(2.0))),
         ("approach", "straight to the dock from 300 m", (AFTER[0], math.inf), APPROACH),
     )
 }
 
-Factory = Callable[[PlanarParameters, Scenario], Navigator]
+Factory = Callable[[NavigatorSetup], Navigator]
 
 
-def _paper_euler(parameters: PlanarParameters, plan: Scenario) -> Navigator:
+def _paper_euler(setup: NavigatorSetup) -> Navigator:
     kind = partial(PaperFilter, integrator="euler", max_substep=TICK)
-    return navigation._docking(parameters, plan, kind, PAPER_NOISE)
+    return docking.navigator(setup, kind, PAPER_NOISE)
 
 
-def _regular(parameters: PlanarParameters, plan: Scenario) -> Navigator:
-    return navigation._docking(parameters, plan, partial(PaperFilter, weights=None), PAPER_NOISE, delayed=False)
+def _regular(setup: NavigatorSetup) -> Navigator:
+    return docking.navigator(setup, partial(PaperFilter, weights=None), PAPER_NOISE, delayed=False)
 
 
-# What estimators of the paper believe: nothing of the dock's compass, as published. Taken for noise of every fix, as
+# What estimators of the paper assume: nothing of the dock's compass, as published. Taken for noise of every fix, as
 # trials have it, its error slows eq. 11 down: in a turn at 40 m to 1.7 times the position error.
 _PUBLISHED = {"dock_heading_deg": 1e-6}
 _CONSTANT = {"current_noise": 1e-8}
 # The planar study's filters, as trials make them for a condensed model, and the estimator settings that differ.
-NAVIGATORS: dict[str, tuple[Factory, Mapping[str, float]]] = {
-    "paper": (navigation.paper, _PUBLISHED),
-    "paper_euler": (_paper_euler, _PUBLISHED),
-    "regular": (_regular, _PUBLISHED),
-    "regular_best": (navigation.regular_ekf, _PUBLISHED),
-    "delay_only": (navigation.delay_only, _PUBLISHED),
-    "current_only": (navigation.current_only, _PUBLISHED),
-    "augmented": (navigation.augmented_ekf, {}),
-    "augmented_constant": (navigation.augmented_ekf, _CONSTANT),
-    "unscented": (navigation.ukf, _CONSTANT),
-    "imm": (navigation.imm, {}),
-    "imm_biases": (navigation.imm_biased, {}),
+NAVIGATORS: dict[str, tuple[Factory, str, Mapping[str, float]]] = {  # factory, kind of its settings, some of them
+    "paper": (docking.paper, "paper", _PUBLISHED),
+    "paper_euler": (_paper_euler, "paper", _PUBLISHED),
+    "regular": (_regular, "regular_ekf", _PUBLISHED),
+    "regular_best": (docking.regular_ekf, "regular_ekf", _PUBLISHED),
+    "delay_only": (docking.delay_only, "delay_only", _PUBLISHED),
+    "current_only": (docking.current_only, "current_only", _PUBLISHED),
+    "augmented": (docking.augmented_ekf, "augmented_ekf", {}),
+    "augmented_constant": (docking.augmented_ekf, "augmented_ekf", _CONSTANT),
+    "unscented": (docking.ukf, "ukf", _CONSTANT),
+    "imm": (docking.imm, "imm", {}),
+    "imm_biases": (docking.imm_biased, "imm_biased", {}),
 }
 QUICK_FILTERS = ("paper", "augmented", "augmented_constant", "imm", "imm_biases")
 assert NAVIGATORS.keys() == FILTERS.keys()
@@ -152,7 +152,7 @@ def bound(row: Row[RunConditions], seed: int) -> float:
     current to be constant, and of the two compasses' errors how large they are in the mean.
     """
     run = simulate(row.conditions, seed)
-    made = navigator("imm", run)
+    made: Any = navigator("imm", run)
     estimator = made._estimator
     noise = _nearly_certain(estimator._filter.noise)
     estimator._filter = along(run, PlanarModels(run.parameters, noise))
@@ -167,11 +167,10 @@ def _nearly_certain(noise: DockingNoise) -> DockingNoise:
     return replace(noise, current=1e-8, biases=biases, **{k: _UNCERTAIN * getattr(noise, k) for k in names})
 
 
-def navigator(key: str, run: Recording) -> Navigator:
-    """A navigator of NAVIGATORS for a run, which believes the fixes to be as good as they are."""
-    factory, settings = NAVIGATORS[key]
-    beliefs = run.plan.estimator.model_copy(update=settings)
-    made = factory(run.parameters, run.plan.model_copy(update={"estimator": beliefs}))
+def navigator(key: str, run: RunRecord) -> Navigator:
+    """A navigator of NAVIGATORS for a run, which assumes the fixes to be as good as they are."""
+    factory, kind, settings = NAVIGATORS[key]
+    made: Any = factory(run.setup(kind, **settings))
     estimator = made._estimator
     estimator._usbl = replace(estimator._usbl, ranges=run.usbl.ranges, deviations=run.usbl.deviations)
     return made

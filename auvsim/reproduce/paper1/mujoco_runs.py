@@ -5,33 +5,35 @@ by the autopilot, from compass and depth gauge. A run is reproduced by its condi
 differ in one thing share all the draws of the rest.
 """
 
-import copy
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cache
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 from numpy.random import Generator
+from pydantic import TypeAdapter
 
-from auvsim.acoustics.link import AcousticSettings, Channel
-from auvsim.acoustics.usbl import Usbl, UsblSettings
+from auvsim.acoustics.link import AcousticSettings
+from auvsim.acoustics.message import Delivery
+from auvsim.acoustics.usbl import UsblSettings
 from auvsim.base.randomness import stream
 from auvsim.base.reading import Reading
-from auvsim.control.torpedo import Autopilot
-from auvsim.navigation.navigator import Commands, EstimatorSettings, Navigator
-from auvsim.physics import planar_fit
-from auvsim.physics.truth import DockPose, Truth
-from auvsim.physics.world import World, compile_scene, compose
+from auvsim.control.controller import Setpoints
+from auvsim.missions.mission import Mission, Situation
+from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.settings import EstimatorSettings
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.truth import StructurePose, Truth
 from auvsim.reproduce.paper1.runs import DENSITIES, TRUTH_STEP, Track, course_round, heading_for
 from auvsim.sensors.compass import Compass
-from auvsim.sensors.depth import Depth
-from auvsim.sensors.feedback import Feedback
 from auvsim.simulation.planar_world import PlanarWorld, planar_state
-from auvsim.simulation.scenario import Scenario, SensorSettings
+from auvsim.simulation.run import Simulation, build_world
+from auvsim.simulation.scenario import Rates, Scenario, StructureSettings, VehicleSettings
+from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
+from auvsim.vehicles.actuation import Commands
 from auvsim.water.currents import CurrentField, Turning, Uniform
 from auvsim.water.settings import TurningSettings
 from estimators.core.types import Array
@@ -39,8 +41,8 @@ from estimators.docking.usbl import UsblModel
 from estimators.planar.model import PlanarParameters
 
 VEHICLE = "remus100"
-SPEED = 1.0  # through the water, as in trials; the planar model is condensed there [m/s]
-POSE = DockPose(depth=20.0, heading=0.0)  # of the dock; the vehicle keeps its depth
+SPEED = 1.0  # through the water, as in trials; the planar model is fitted there [m/s]
+POSE = StructurePose(depth=20.0, heading=0.0)  # of the dock; the vehicle keeps its depth
 REACHED = 12.0  # distance from the dock at which an approach ends [m]
 
 
@@ -57,9 +59,9 @@ class RunConditions:
     fixes_of: float | None = None  # distance whose noise and delay all fixes have [m]; None: that at which they are
     usbl: Mapping[str, Any] = field(default_factory=dict)  # of UsblSettings
     acoustics: Mapping[str, Any] = field(default_factory=dict)  # of AcousticSettings
-    thrust: float = 1.0  # X_nn by what filters believe of it
-    compass_bias: float | None = None  # what the compass shows too much [rad]; None: drawn, as in trials
-    planar: bool = False  # instead of MuJoCo's, the truth of the condensed model with the planar study's process noise
+    thrust: float = 1.0  # true X_nn over the one that filters assume
+    compass_bias: float | None = None  # [rad]; None: drawn, as in trials
+    planar: bool = False  # truth of the fitted planar model with the planar study's process noise, not MuJoCo's
 
 
 class Tick(NamedTuple):
@@ -72,24 +74,38 @@ class Tick(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
-class Recording:
+class RunRecord:
     """What happened."""
 
     plan: Scenario
-    parameters: PlanarParameters  # as a navigator believes them
-    usbl: UsblModel  # the fixes' noise, as it may believe it
+    parameters: PlanarParameters  # as a navigator assumes them
+    usbl: UsblModel  # the fixes' noise, as it may assume it
     ticks: tuple[Tick, ...]
     times: Array  # (k,) [s]
     states: Array  # (k, 8); the heading is wrapped
 
+    def setup(self, kind: str, **settings: Any) -> NavigatorSetup:
+        """What a navigator of a kind, and of some settings that are not the defaults, is made from."""
+        (name, vehicle), rates = self.plan.lone, self.plan.rates
+        return NavigatorSetup(
+            vehicle=name,
+            settings=TypeAdapter(EstimatorSettings).validate_python({"kind": kind, **settings}),
+            parameters=self.parameters,
+            actuation=library.vehicle(VEHICLE).actuation,
+            period=1.0 / rates.filter,
+            rates=dict(rated(vehicle.sensors)),
+            usbl=vehicle.sensors.usbl,
+            dock=POSE,
+        )
 
-def simulate(conditions: RunConditions, seed: int) -> Recording:
+
+def simulate(conditions: RunConditions, seed: int) -> RunRecord:
     """The run of a seed."""
-    plan, parameters = _plan(conditions), planar_fit.fit_planar_model(VEHICLE, SPEED).parameters
-    ticks = tuple(run_ticks(conditions, plan, seed))
-    usbl = plan.sensors.usbl
+    plan, parameters = _plan(conditions), fit_planar_model(VEHICLE, SPEED).parameters
+    ticks = run_ticks(conditions, plan, seed)
+    usbl = plan.lone[1].sensors.usbl
     ranges, deviations = zip(*usbl.noise, strict=True)
-    return Recording(
+    return RunRecord(
         plan=plan,
         parameters=replace(parameters, X_nn=parameters.X_nn / conditions.thrust),
         usbl=UsblModel(transceiver=usbl.transceiver, ranges=ranges, deviations=deviations),
@@ -99,17 +115,85 @@ def simulate(conditions: RunConditions, seed: int) -> Recording:
     )
 
 
-def track(recording: Recording, navigator: Navigator) -> Track:
+def track(run: RunRecord, navigator: Navigator) -> Track:
     """How a navigator follows a run."""
-    count = len(recording.ticks)
+    count = len(run.ticks)
     means, covariances = np.full((count, 8), math.nan), np.zeros((count, 8, 8))
     estimate = None
-    for k, tick in enumerate(recording.ticks):
-        estimate = navigator.update(tick.time, tick.readings, tick.commands)
+    for k, tick in enumerate(run.ticks):
+        estimate = navigator.update(tick.time, tick.readings, (), tick.commands)
         if estimate.initialised:
-            means[k] = *estimate.position[:2], estimate.heading, *estimate.velocity, *estimate.current
+            means[k] = estimate.state
             covariances[k] = estimate.covariance
     return Track(means=means, covariances=covariances, refused=dict(estimate.reasons) if estimate else {})
+
+
+def run_ticks(conditions: RunConditions, plan: Scenario, seed: int) -> tuple[Tick, ...]:
+    """The ticks of a run: the closed loop of any other, but with a course by the truth, and nothing estimated."""
+
+    def noise(source: str) -> Generator:
+        return stream(seed, 0, f"{VEHICLE}/{source}")
+
+    bearing, direction, side = noise("conditions").uniform(-math.pi, math.pi, 3).tolist()
+    current = _current(conditions, direction, side)
+    world = _planar_world(current, noise("process")) if conditions.planar else build_world(plan, current)
+    listener, steered = _Listener(), _Steered(conditions)
+    parts: dict[str, Any] = {"navigators": {VEHICLE: listener}, "missions": {VEHICLE: steered}}
+    simulation = Simulation(plan, seed, world=world, record=False, **parts)
+    listener.truth = steered.truth = lambda: simulation.truths[VEHICLE]
+    for sensor, _ in simulation.agents[0].sensors:
+        if isinstance(sensor, Compass) and conditions.compass_bias is not None:
+            sensor.heading_bias = conditions.compass_bias
+    distance = conditions.approach or conditions.radius
+    place = np.array((distance * math.cos(bearing), distance * math.sin(bearing), POSE.depth))
+    water = current.evaluate(0.0, place).velocity
+    heading = _heading(conditions, np.array((*place[:2], 0.0, SPEED, 0.0, 0.0, *water[:2])))
+    fitted, agent = fit_planar_model(VEHICLE, SPEED), simulation.agents[0]
+    agent.commands = agent.vehicle.actuation.at_speed(fitted.shaft_speed)  # steady from the begin
+    world.reset()
+    simulation.place(VEHICLE, place, heading, SPEED)
+    while simulation.ticks < round(conditions.duration * plan.rates.control) and not simulation.over:
+        simulation.step()
+    return tuple(listener.ticks)
+
+
+class _Listener:
+    """Takes the place of an estimator: it keeps what one would be told."""
+
+    states = PLANAR_STATES
+    truth: Callable[[], Truth]
+
+    def __init__(self) -> None:
+        self.ticks: list[Tick] = []
+
+    def update(
+        self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
+    ) -> Estimate:
+        self.ticks.append(Tick(time, tuple(readings), commands, planar_state(self.truth())))
+        nothing = np.zeros(3)
+        return Estimate(
+            time=time, position=nothing, heading=0.0, velocity=nothing, current=nothing[:2],
+            covariance=np.zeros((8, 8)), initialised=False,
+        )  # fmt: skip
+
+    def reset(self) -> None:
+        self.ticks.clear()
+
+
+class _Steered(Mission):
+    """Keeps the course by the truth, since navigation is what is judged."""
+
+    phases = ("steered",)
+    truth: Callable[[], Truth]
+
+    def __init__(self, conditions: RunConditions) -> None:
+        self.phase, self.finished, self.events, self.dock = 0, False, [], None
+        self._conditions = conditions
+
+    def update(self, now: Situation) -> Setpoints:
+        state = planar_state(self.truth())
+        self.finished = bool(self._conditions.approach) and math.hypot(*state[:2]) < REACHED
+        return Setpoints(_heading(self._conditions, state), POSE.depth, SPEED)
 
 
 def _plan(conditions: RunConditions) -> Scenario:
@@ -120,72 +204,15 @@ def _plan(conditions: RunConditions) -> Scenario:
         usbl["noise"] = ((conditions.fixes_of, UsblModel().deviation(conditions.fixes_of)),)
         link = AcousticSettings()
         acoustics |= {"delay": link.delay + link.per_metre * conditions.fixes_of, "per_metre": 0.0}
-    return Scenario(
-        duration=conditions.duration,
-        sensors=SensorSettings(usbl=UsblSettings(**usbl)),
-        acoustics=AcousticSettings(**acoustics),
-        estimator=EstimatorSettings(model_speed=SPEED),
+    return Scenario.model_validate(
+        {
+            "duration": conditions.duration,
+            "rates": Rates(physics=1.0 / TRUTH_STEP) if conditions.planar else Rates(),
+            "network": {"acoustics": AcousticSettings(**acoustics)},
+            "structures": {"dock": StructureSettings(depth=POSE.depth)},
+            "vehicles": {VEHICLE: VehicleSettings(sensors=SensorSettings(usbl=UsblSettings(**usbl)))},
+        }
     )
-
-
-def run_ticks(conditions: RunConditions, plan: Scenario, seed: int) -> Iterator[Tick]:
-    """The ticks of a run: truth -> sensors -> autopilot -> truth, with a course by the truth."""
-
-    def noise(source: str) -> Generator:
-        return stream(seed, 0, f"{VEHICLE}/{source}")
-
-    believed, vehicle, rates = planar_fit.fit_planar_model(VEHICLE, SPEED), library.vehicle(VEHICLE), plan.rates
-    bearing, direction, side = noise("conditions").uniform(-math.pi, math.pi, 3).tolist()
-    current = _current(conditions, direction, side)
-    world, steps = _world(conditions, plan, vehicle, current, noise("process"))
-    instruments = _Instruments(conditions, plan, noise)
-    limits = vehicle.allocation.limit, vehicle.shaft_limit
-    autopilot = Autopilot(plan.control, believed.shaft_speed_for, *limits, 1.0 / rates.control)
-
-    distance = conditions.approach or conditions.radius
-    place = np.array((distance * math.cos(bearing), distance * math.sin(bearing), POSE.depth))
-    water = current.evaluate(0.0, place).velocity
-    state = np.array((*place[:2], 0.0, SPEED, 0.0, 0.0, *water[:2]))
-    commands = Commands(0.0, 0.0, believed.shaft_speed)
-    world.place(place, _heading(conditions, state), SPEED, commands.shaft_speed)
-    truth, since = world.truth(), []
-    for tick in range(1, round(conditions.duration * rates.control) + 1):
-        world.advance(steps)
-        before, truth = truth, world.truth()
-        readings = instruments.read(before, truth)
-        since += readings
-        autopilot.observe(readings)
-        state = planar_state(truth)
-        if tick % round(rates.control / rates.filter) == 0:
-            yield Tick(truth.time, tuple(since), commands, state)
-            since = []
-        if conditions.approach and math.hypot(*state[:2]) < REACHED:
-            return
-        commands = autopilot.command(_heading(conditions, state), POSE.depth, SPEED)
-        world.command(*commands)
-
-
-class _Instruments:
-    """The sensors and the modem of a trial; those on board measure at every control tick."""
-
-    def __init__(self, conditions: RunConditions, plan: Scenario, noise: Callable[[str], Generator]) -> None:
-        settings = plan.sensors
-        compass = Compass(settings.compass, noise("compass"))
-        if conditions.compass_bias is not None:
-            compass.heading_bias = conditions.compass_bias
-        self._on_board = (
-            compass,
-            Depth(settings.depth, noise("depth")),
-            Feedback(settings.feedback, noise("feedback")),
-        )
-        self._usbl = Usbl(settings.usbl, noise("usbl"), POSE)
-        self._channel = Channel(plan.acoustics, noise("acoustics"))
-
-    def read(self, before: Truth, now: Truth) -> list[Reading]:
-        """What is measured or arrives now."""
-        for ping in self._usbl.poll(before, now):
-            self._channel.send(ping.reading, ping.slant_range)
-        return [*(sensor.measure(now) for sensor in self._on_board), *self._channel.receive(now.time)]
 
 
 def _heading(conditions: RunConditions, state: Array) -> float:
@@ -205,22 +232,7 @@ def _current(conditions: RunConditions, direction: float, side: float) -> Curren
     return Turning(TurningSettings(speed=speed, direction_deg=direction_deg, angle_deg=angle, start=start, end=end))
 
 
-def _world(
-    conditions: RunConditions, plan: Scenario, vehicle: library.Vehicle, current: CurrentField, generator: Generator
-) -> tuple[World | PlanarWorld, int]:
-    """The truth, and its steps in a control period."""
-    if conditions.planar:
-        parameters = planar_fit.fit_planar_model(VEHICLE, SPEED).parameters
-        world = PlanarWorld(parameters, vehicle.allocation, current, 1.0 / TRUTH_STEP, DENSITIES, generator)
-        return world, round(1.0 / (TRUTH_STEP * plan.rates.control))
-    model = copy.copy(_scene())
-    world = World(model, mujoco.MjData(model), vehicle, POSE, current, plan.world.water_density)
-    return world, round(plan.rates.physics / plan.rates.control)
-
-
-@cache
-def _scene() -> mujoco.MjModel:
-    """The compiled scene, the same for all runs."""
-    plan = Scenario()
-    root = compose(library.vehicle(VEHICLE), library.dock(plan.dock.model), POSE, plan.world, plan.rates.physics)
-    return compile_scene(root)
+def _planar_world(current: CurrentField, generator: Generator) -> PlanarWorld:
+    """The truth of the fitted planar model; a step of it is a physics tick of its scenario."""
+    parameters, actuation = fit_planar_model(VEHICLE, SPEED).parameters, library.vehicle(VEHICLE).actuation
+    return PlanarWorld(VEHICLE, parameters, actuation, current, 1.0 / TRUTH_STEP, DENSITIES, generator)

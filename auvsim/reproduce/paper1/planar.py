@@ -7,7 +7,8 @@ from functools import partial
 
 import numpy as np
 
-from auvsim.reproduce.paired import Progress, Task, results, run_seed, run_tasks, score_tasks, scores
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.reproduce.paired import results, run_seed, score_tasks, scores
 from auvsim.reproduce.paper1.runs import Conditions, in_order, simulate, track
 from auvsim.reproduce.paper1.study import FILTERS, ROWS, Result, Row, Score
 from auvsim.reproduce.paper1.yardsticks import batch_and_filter, bound
@@ -31,14 +32,14 @@ class Curves:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Study:
-    """What the study came to."""
+    """Results of the study."""
 
     seed: int
     quick: bool
     runs: Mapping[str, int]  # by row
     results: Mapping[str, Mapping[str, Result]]  # by row and filter
     bounds: Mapping[str, float]  # rms [m] of the posterior Cramér-Rao bound, by settled row
-    batches: Mapping[str, float]  # rms of the batch estimate by that of the augmented filter, by settled row
+    batches: Mapping[str, float]  # rms of the batch estimate relative to the augmented filter, by settled row
     worst_delivery: float  # largest difference of states, late and out-of-order delivery from prompt delivery
     curves: Curves
 

@@ -157,7 +157,7 @@ def figure7(study: Study) -> Figure:
         dress(panels[1 + k], f"Current {axis}: truth and estimates", "time [s]" if k else "", "current [m/s]")
     for axes in panels:
         _mark_turn(axes)
-    finish(figure, panels[:2], "The same circle: error, and the current that the filters believed in")
+    finish(figure, panels[:2], "The same circle: error, and the estimated current")
     return figure
 
 
@@ -182,7 +182,7 @@ def study_figure(study: Study) -> Figure:
     axes.minorticks_off()
     axes.set_xlim(0.01, 40.0)
     axes.set_yticklabels([ROWS[name].title for name in names])
-    dress(axes, "Left of the line: better than the paper's filter", "rms error by that of the paper's filter", "")
+    dress(axes, "Left of the line: better than the paper's filter", "rms error relative to the paper's filter", "")
     finish(figure, axes, f"Paper 1's study, seed {study.seed}{', quick' if study.quick else ''}: 95 % intervals")
     return figure
 

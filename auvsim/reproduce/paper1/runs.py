@@ -40,9 +40,9 @@ class Conditions:
     late: float = 0.0  # share of fixes that arrive 5 to 15 s later, and so out of order
     outliers: float = 0.0  # share of fixes, not the first, that are wrong
     outlier_distance: tuple[float, float] = (10.0, 30.0)  # by how much, drawn evenly [m]
-    thrust: float = 1.0  # true thrust by what filters believe of it
-    compass_bias: float = 0.0  # what the compass shows too much [rad]
-    dock_heading_bias: float = 0.0  # what the dock's compass shows too much [rad]
+    thrust: float = 1.0  # true thrust relative to that which filters assume
+    compass_bias: float = 0.0  # of the vehicle's compass [rad]
+    dock_heading_bias: float = 0.0  # of the dock's compass [rad]
     clock_offset: float = 0.0  # how much later than its stamp a fix is taken [s]
     # False: fixed rudder, the noise and delay of the fixes as at `radius` while the current carries the circle away
     # (the reference). True: held on the circle by a course controller that knows the truth, noise and delay by range.
@@ -59,10 +59,10 @@ class Run:
     compass: Array  # (k,) [rad]
     rudder: Array  # (k,) mean since the last tick [rad]
     fixes: tuple[UsblFix, ...]  # in order of arrival
-    usbl: UsblModel  # the noise of the fixes, as a filter may believe it
+    usbl: UsblModel  # noise of the fixes that a filter may assume
 
 
-class Way(Protocol):
+class Trajectory(Protocol):
     """The truth of a run."""
 
     @property
@@ -78,13 +78,13 @@ class Way(Protocol):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Track:
-    """What a filter believed at the ticks of a run."""
+    """Estimates of a filter at the ticks of a run."""
 
     means: Array  # (k, 8); NaN before the first fix
     covariances: Array  # (k, 8, 8)
     refused: dict[str, int]
 
-    def errors(self, run: Way) -> Array:
+    def errors(self, run: Trajectory) -> Array:
         """Horizontal distance (k,) from the truth [m]."""
         return np.linalg.norm((self.means - run.states)[:, :2], axis=1)
 
@@ -141,8 +141,8 @@ def track(run: Run, docking_filter: Any, **options: Any) -> Track:
 
 def _way(conditions: Conditions, rng: np.random.Generator) -> tuple[Array, Array]:
     """True states (n, 8) every TRUTH_STEP, and the mean rudder since the last tick (k,)."""
-    believed = PRESTERO
-    parameters = replace(believed, X_prop=conditions.thrust * believed.X_prop)
+    assumed = PRESTERO
+    parameters = replace(assumed, X_prop=conditions.thrust * assumed.X_prop)
     process = PlanarProcess(parameters, np.zeros(8))
     rudder = STEADY_RUDDER[conditions.radius]
     heading, direction = rng.uniform(-math.pi, math.pi, 2)

@@ -8,7 +8,7 @@ from typing import Any, Generic, TypeVar
 
 import numpy as np
 
-from auvsim.reproduce.paper1.runs import TICK, Conditions, Track, Way, simulate, track
+from auvsim.reproduce.paper1.runs import TICK, Conditions, Track, Trajectory, simulate, track
 from estimators.core.consistency import nees
 from estimators.docking.estimator import (
     INTERACTING_NOISE,
@@ -137,7 +137,7 @@ class Result:
     worst_rms: float  # of one run [m]
     nees: float  # of the position per degree of freedom
     state_nees: float  # of all eight states
-    ratio: float  # rms by that of the reference
+    ratio: float  # rms relative to the reference
     ratio_deviation: float  # its standard deviation, by leaving out one run at a time; NaN of a single run
 
 
@@ -147,7 +147,7 @@ def evaluate(row: Row[Conditions], seed: int, filters: Sequence[str] = tuple(FIL
     return {name: score(row, run, track(run, FILTERS[name].make(), **FILTERS[name].options)) for name in filters}
 
 
-def score(row: Row, run: Way, followed: Track) -> Score:
+def score(row: Row, run: Trajectory, followed: Track) -> Score:
     """The score of a track in the row's window; ticks before the first estimate do not count."""
     begin, end = row.window
     counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])

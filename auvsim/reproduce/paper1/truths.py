@@ -100,8 +100,8 @@ def truths_figure(planar: Study, mujoco: MujocoStudy) -> Figure:
     left.set_yticklabels([title(name) for name, _ in rows])
     _scale(left, (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5))
     _scale(right, (0.2, 0.5, 1, 2, 5, 10, 20, 50))
-    dress(left, "Left of the line: better than the paper's filter", "rms error by that of the paper's filter", "")
-    dress(right, "On the line: consistent; right of it: too sure", "NEES of the position per axis", "")
+    dress(left, "Left of the line: better than the paper's filter", "rms error relative to the paper's filter", "")
+    dress(right, "On the line: consistent; right of it: overconfident", "NEES of the position per axis", "")
     finish(figure, left, "Paper 1's study on the planar model's truth and on MuJoCo's")
     return figure
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from auvsim.reproduce.paper1.runs import TICK, Track, Way, follow, simulate, track
+from auvsim.reproduce.paper1.runs import TICK, Track, Trajectory, follow, simulate, track
 from auvsim.reproduce.paper1.study import FILTERS, Row
 from estimators.core import batch
 from estimators.core.bounds import PosteriorBound
@@ -31,7 +31,7 @@ def bound(row: Row, seed: int) -> float:
     return mean_square(row, run, track(run, along(run, models)))
 
 
-def along(run: Way, models: PlanarModels) -> PosteriorBound:
+def along(run: Trajectory, models: PlanarModels) -> PosteriorBound:
     """The bound of a filter of these models, given the true way of a run; constant errors are taken as zero."""
     columns = [*run.states.T, *np.zeros((len(models.noise.biases), len(run.times)))]
     columns[2] = np.unwrap(columns[2])
@@ -47,7 +47,7 @@ def along(run: Way, models: PlanarModels) -> PosteriorBound:
     return PosteriorBound(models.process, sensors, truths, first, models.noise)
 
 
-def mean_square(row: Row, run: Way, followed: Track) -> float:
+def mean_square(row: Row, run: Trajectory, followed: Track) -> float:
     """Mean square [m^2] of the position that a track's covariances claim, in the row's window."""
     begin, end = row.window
     counted = (run.times >= begin) & (run.times <= end) & np.isfinite(followed.means[:, 0])

@@ -5,21 +5,29 @@ import subprocess
 import sys
 from collections.abc import Mapping
 from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from auvsim.analysis import summary
 from auvsim.base.reading import Reading
 from auvsim.data import log
-from auvsim.data.log import TrialLog
-from auvsim.missions.docking import metrics
-from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position
+from auvsim.data.log import VehicleLog
+from auvsim.data.phases import phase_at, phase_stretches
+from auvsim.missions.docking import dock_frame
+from auvsim.missions.docking.dock_frame import nose_position
 from auvsim.missions.docking.guidance import Phase
-from auvsim.navigation import navigator as navigation
-from auvsim.navigation.navigator import Commands
+from auvsim.navigation import registry
+from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.physics import planar_fit
 from auvsim.simulation import sampling, scenario
-from auvsim.simulation.trial import Loop, ProgressState, run_trial
+from auvsim.simulation.run import ProgressState, Simulation
+from auvsim.simulation.run import run as run_scenario
+from auvsim.simulation.sensor_settings import rated
+from auvsim.vehicles import library
+from auvsim.vehicles.actuation import Commands
 
 LATCHED = 1.28923  # where the shipped dock holds the nose [m]
 
@@ -29,18 +37,34 @@ def plan(seed: int, **pinned: object) -> scenario.Scenario:
     return scenario.parse(sampling.draw(sampling.merge(sampling.default_plan(), pinned), seed))
 
 
-def run(seed: int, **pinned: object) -> TrialLog:
-    """Runs it."""
+def run_trial(settled: scenario.Scenario, **options: Any) -> VehicleLog:
+    """Runs a scenario of one vehicle."""
+    return run_scenario(settled, **options).vehicle()
+
+
+def run(seed: int, **pinned: object) -> VehicleLog:
+    """Runs trial 0 of the default plan with some values pinned."""
     return run_trial(plan(seed, **pinned), seed=seed)
 
 
-def events(trial: TrialLog) -> list[tuple[str, str]]:
+def summarise(trial: VehicleLog) -> SimpleNamespace:
+    """The summary of a trial."""
+    return SimpleNamespace(**summary.summarise(trial))
+
+
+def in_dock_frame(trial: VehicleLog, position: np.ndarray) -> np.ndarray:
+    """Places seen from the trial's dock."""
+    assert trial.structure is not None
+    return dock_frame.in_dock_frame(trial.structure, position)
+
+
+def events(trial: VehicleLog) -> list[tuple[str, str]]:
     """Kind and text of each event."""
     return list(zip(trial["event"]["kind"].tolist(), trial["event"]["text"].tolist(), strict=True))
 
 
 @pytest.fixture(scope="module")
-def docked() -> TrialLog:
+def docked() -> VehicleLog:
     """A trial that docks at its first attempt, from close by and with the default noises."""
     return run(11, vehicle={"start": {"range": 230.0, "bearing_deg": 20.0}})
 
@@ -48,20 +72,21 @@ def docked() -> TrialLog:
 def test_replays_bit_for_bit() -> None:
     """The same scenario and seed give the same arrays; another seed or another trial number other noises."""
     short = plan(5, duration=40.0)
-    first = run_trial(short, seed=5)
-    assert log.differences(first, run_trial(short, seed=5)) == []
-    for other in (run_trial(short, seed=6), run_trial(short, seed=5, trial=1)):
+    first = run_scenario(short, seed=5)
+    assert log.differences(first, run_scenario(short, seed=5)) == []
+    noisy = {f"vehicles/remus100/sensors/{name}/value" for name in ("compass", "depth", "usbl")}
+    for other in (run_scenario(short, seed=6), run_scenario(short, seed=5, trial=1)):
         different = log.differences(first, other)
-        assert {"compass/value", "depth/value", "usbl/value", "usbl/time", "truth/position"} <= set(different)
-        assert "feedback/time" not in different
+        assert {*noisy, "vehicles/remus100/sensors/usbl/time", "vehicles/remus100/truth/position"} <= set(different)
+        assert "vehicles/remus100/sensors/feedback/time" not in different
 
 
-def noises(trial: TrialLog) -> dict[str, np.ndarray]:
+def noises(trial: VehicleLog) -> dict[str, np.ndarray]:
     """The errors of each sensor of a log, from the truth of the same ticks."""
     truth = trial["truth"]
     at = {name: np.searchsorted(truth["time"], trial[name]["time"]) for name in ("compass", "depth", "feedback")}
     turn = trial["compass"]["value"] - truth["attitude"][at["compass"]][:, ::-1]
-    actuators = np.c_[truth["fins"], truth["shaft_speed"]]
+    actuators = truth["actuators"]
     return {
         "compass": np.angle(np.exp(1j * turn)),
         "depth": trial["depth"]["value"] - truth["position"][at["depth"], 2:],
@@ -89,7 +114,7 @@ def test_a_change_to_one_sensor_changes_no_other_noise(changed: str, pinned: Map
     """Although the vehicle then goes elsewhere, the errors of all other sensors stay what they were."""
     # Noise is drawn in blocks: in 100 s every sensor at 10 Hz takes more than one.
     before, after = run(8, duration=100.0), run(8, duration=100.0, **pinned)
-    assert "truth/position" in log.differences(before, after)
+    assert "vehicles/remus100/truth/position" in log.differences(before.log, after.log)
     errors, others = noises(before), noises(after)
     for sensor in errors:
         if sensor != changed:
@@ -100,7 +125,7 @@ def test_a_change_to_one_sensor_changes_no_other_noise(changed: str, pinned: Map
         assert after["usbl"]["lost"].mean() > 0.5
 
 
-def delivered(trial: TrialLog, start: float, end: float) -> list[Reading]:
+def delivered(trial: VehicleLog, start: float, end: float) -> list[Reading]:
     """The readings of a log that arrived in (start, end], tick by tick in the order of the loop."""
     found = []
     for order, sensor in enumerate(("compass", "depth", "feedback", "usbl")):
@@ -113,13 +138,25 @@ def delivered(trial: TrialLog, start: float, end: float) -> list[Reading]:
     return [reading for *_, reading in sorted(found, key=lambda item: item[:3])]
 
 
-def test_the_estimate_is_a_function_of_the_readings(docked: TrialLog) -> None:
+def test_the_estimate_is_a_function_of_the_readings(docked: VehicleLog) -> None:
     """A new estimator fed with the log's readings alone gives the log's estimates, bit for bit."""
-    again = scenario.from_yaml(str(docked.attributes["scenario"]))
-    navigator = navigation.build("augmented_ekf", planar_fit.fit_planar_model("remus100", 1.0).parameters, again)
+    again = scenario.from_yaml(str(docked.log.attributes["scenario"]))
+    name, vehicle = again.lone
+    navigator = registry.build(
+        NavigatorSetup(
+            vehicle=name,
+            settings=vehicle.estimator,
+            parameters=planar_fit.fit_planar_model("remus100", 1.0).parameters,
+            actuation=library.vehicle("remus100").actuation,
+            period=0.5,
+            rates=dict(rated(vehicle.sensors)),
+            usbl=vehicle.sensors.usbl,
+            dock=again.structures["dock"].pose,
+        )
+    )
     estimate, before = docked["estimate"], 0.0
     for k, time in enumerate(estimate["time"].tolist()):
-        new = navigator.update(time, delivered(docked, before, time), Commands(math.nan, math.nan, math.nan))
+        new = navigator.update(time, delivered(docked, before, time), (), Commands(math.nan, math.nan, math.nan))
         assert new.position.tobytes() == estimate["position"][k].tobytes()
         assert new.covariance.tobytes() == estimate["covariance"][k].tobytes()
         before = time
@@ -127,21 +164,20 @@ def test_the_estimate_is_a_function_of_the_readings(docked: TrialLog) -> None:
 
 OWN = """
 import numpy as np
-from auvsim.navigation import Commands, Estimate
-from auvsim.scenario import Scenario
-from auvsim.sensors.reading import Reading
-from estimators.planar_model import PlanarParameters
+from auvsim.navigation.estimate import PLANAR_STATES, Estimate
 
 given, told, said = [], [], []
 
 class Last:
+    states = PLANAR_STATES
+
     def __init__(self):
         self.reset()
 
     def reset(self):
         self.place, self.heading = None, 0.0
 
-    def update(self, time, readings, commands):
+    def update(self, time, readings, messages, commands):
         told.append((time, tuple(readings), commands))
         for reading in readings:
             if reading.sensor == "compass":
@@ -162,23 +198,23 @@ class Last:
         said.append(estimate)
         return estimate
 
-def factory(parameters, scenario):
-    given.append((parameters, scenario))
+def factory(setup):
+    given.append(setup)
     return Last()
 """
 
 
 def test_an_estimator_of_ones_own_drives_the_trial(tmp_path, monkeypatch) -> None:
-    """It gets parameters, scenario, readings and commands, nothing else and nothing early; guidance steers by it."""
+    """It gets a set-up, readings and commands, nothing else and nothing early; guidance steers by it."""
     (tmp_path / "last_fix.py").write_text(OWN)
     monkeypatch.syspath_prepend(tmp_path)
     mine = plan(9, duration=60.0, estimator={"factory": "last_fix:factory"})
     trial = run_trial(mine, seed=9)
     import last_fix  # pyright: ignore[reportMissingImports]
 
-    ((parameters, given),) = last_fix.given
-    assert given is mine
-    assert parameters == planar_fit.fit_planar_model("remus100", 1.0).parameters
+    (setup,) = last_fix.given
+    assert (setup.vehicle, setup.settings, setup.period) == ("remus100", {}, 0.5)
+    assert setup.parameters == planar_fit.fit_planar_model("remus100", 1.0).parameters
     times = [time for time, _, _ in last_fix.told]
     assert times == trial["estimate"]["time"].tolist()
     assert len(times) == 120
@@ -192,7 +228,8 @@ def test_an_estimator_of_ones_own_drives_the_trial(tmp_path, monkeypatch) -> Non
     for k, estimate in enumerate(last_fix.said):
         np.testing.assert_array_equal(trial["estimate"]["position"][k], estimate.position)
     # Guidance's own reckoning starts from these estimates: along and cross track of the nose at their times.
-    guidance, heading = trial["guidance"], trial.number("dock_heading")
+    assert trial.structure is not None
+    guidance, heading = trial["mission"], trial.structure.heading
     fixed = [e for e in last_fix.said if e.initialised]
     at = np.searchsorted(guidance["time"], [e.time for e in fixed])
     along = [e.position[0] * math.cos(heading) + e.position[1] * math.sin(heading) for e in fixed]
@@ -209,11 +246,11 @@ def test_interrupted_keeps_the_log_up_to_there() -> None:
             raise KeyboardInterrupt
 
     trial = run_trial(plan(3), seed=3, progress=interrupt)
-    assert trial.attributes["status"] == "interrupted"
+    assert trial.log.attributes["status"] == "interrupted"
     assert events(trial)[-1] == ("interrupted", "stopped by the user")
-    for group in ("truth", "guidance", "command", "compass"):
+    for group in ("truth", "mission", "command", "compass"):
         assert trial[group]["time"][-1] == pytest.approx(24.0, abs=1e-9)  # progress comes every 6 s
-    assert metrics.summarise(trial).failure_reason == "interrupted"
+    assert summarise(trial).failure_reason == "interrupted"
 
 
 def test_progress_tells_where_the_vehicle_is() -> None:
@@ -231,12 +268,13 @@ def test_progress_tells_where_the_vehicle_is() -> None:
 def test_diverged_keeps_the_log_up_to_there() -> None:
     """A physics step of half a second is beyond the stability of the fins' servos."""
     slow = {name: {"rate": 2.0} for name in ("compass", "depth", "feedback")}
-    trial = run(3, rates={"physics": 2.0, "control": 2.0, "log": 2.0}, sensors=slow)
-    assert trial.attributes["status"] == "diverged"
+    settled = plan(3, rates={"physics": 2.0, "control": 2.0, "log": 2.0}, sensors=slow)
+    trial = run_trial(settled, seed=3, check_step=False)
+    assert trial.log.attributes["status"] == "diverged"
     kind, text = events(trial)[-1]
     assert (kind, text.split(" at ")[0]) == ("diverged", "diverged")
     assert np.isfinite(trial["truth"]["position"]).all()
-    assert metrics.summarise(trial).failure_reason == "diverged"
+    assert summarise(trial).failure_reason == "diverged"
 
 
 def test_what_the_estimator_refuses_is_named_in_the_log() -> None:
@@ -262,7 +300,7 @@ def test_control_waits_for_the_first_readings() -> None:
     """With a depth gauge at 1 Hz nothing is commanded in the first second, and the trial goes on as started."""
     trial = run(4, duration=10.0, sensors={"depth": {"rate": 1.0}})
     assert trial["command"]["time"][0] == pytest.approx(1.0)
-    assert trial["guidance"]["time"][0] == pytest.approx(1.0)
+    assert trial["mission"]["time"][0] == pytest.approx(1.0)
     # Times are ticks, not sums of steps.
     np.testing.assert_allclose(trial["compass"]["time"], np.arange(1, 101) / 10.0, rtol=1e-15)
 
@@ -272,43 +310,43 @@ def test_other_rates() -> None:
     rates = {"physics": 50.0, "control": 5.0, "filter": 1.0, "log": 1.0}
     sensors = {"compass": {"rate": 5.0}, "depth": {"rate": 1.0}, "feedback": {"rate": 5.0}}
     trial = run(12, rates=rates, sensors=sensors, vehicle={"start": {"range": 230.0, "bearing_deg": 0.0}})
-    assert metrics.summarise(trial).docked
-    wanted = {"truth": 1.0, "estimate": 1.0, "guidance": 5.0, "command": 5.0, "compass": 5.0, "depth": 1.0}
+    assert summarise(trial).docked
+    wanted = {"truth": 1.0, "estimate": 1.0, "mission": 5.0, "command": 5.0, "compass": 5.0, "depth": 1.0}
     for group, rate in wanted.items():
         np.testing.assert_allclose(np.diff(trial[group]["time"]), 1.0 / rate, atol=1e-9)
     assert (trial["contact"]["time"] * 50.0 % 1.0 + 1e-6) % 1.0 == pytest.approx(0.0, abs=1e-5)
 
 
-def test_docked_is_docked(docked: TrialLog) -> None:
+def test_docked_is_docked(docked: VehicleLog) -> None:
     """The whole of a good trial: its phases, the latch, and what follows it."""
     phases = [kind for kind, _ in events(docked) if kind != "refused"]
     assert phases == ["homing", "approach", "final", "docked"]
     assert all(text for _, text in events(docked))
-    phases = docked["guidance"]["phase"]
-    assert [int(phase) for phase, _, _ in metrics.phase_stretches(phases)] == [0, 1, 2, 3, 4]
-    summary = metrics.summarise(docked)
-    assert (summary.docked, summary.attempts, summary.failure_reason) == (True, 1, None)
-    assert docked["truth"]["time"][-1] == pytest.approx(summary.time + 5.0, abs=0.11)  # the aftermath, and a tick
-    assert summary.miss_distance is not None
-    assert summary.miss_distance < 0.75  # the mouth's radius
+    phases = docked["mission"]["phase"]
+    assert [int(phase) for phase, _, _ in phase_stretches(phases)] == [0, 1, 2, 3, 4]
+    found = summarise(docked)
+    assert (found.docked, found.attempts, found.failure_reason) == (True, 1, None)
+    assert docked["truth"]["time"][-1] == pytest.approx(found.time + 5.0, abs=0.11)  # the aftermath, and a tick
+    assert found.miss_distance is not None
+    assert found.miss_distance < 0.75  # the mouth's radius
 
 
 def test_a_latched_vehicle_stays_latched() -> None:
     """A minute after docking, in a cross current: nose on its place, at rest, and the verdict unchanged."""
     pinned = {"vehicle": {"start": {"range": 230.0, "bearing_deg": 0.0}}, "dock": {"heading_deg": 90.0}}
-    loop = Loop(plan(13, current={"kind": "uniform", "speed": 0.3, "direction_deg": 0.0}, **pinned), 13, 0)
+    loop = Simulation(plan(13, current={"kind": "uniform", "speed": 0.3, "direction_deg": 0.0}, **pinned), 13)
     while not loop.over:
         loop.step()
     end = loop.time
     while loop.time < end + 60.0:
         loop.step()
-    trial = loop.finish("complete", 1.0)
+    trial = loop.log.finish("complete", wall_time=1.0).vehicle()
     after = trial["truth"]["time"] > end
     nose = in_dock_frame(trial, nose_position(trial))[after]
     # The latch is a soft weld, 0.15 s: in 0.3 m/s across it gives by some centimetres.
     np.testing.assert_allclose(nose, np.tile([LATCHED, 0.0, 0.0], (len(nose), 1)), atol=0.05)
     assert np.abs(trial["truth"]["nu"][after, :3]).max() < 0.02
-    assert set(trial["guidance"]["phase"][trial["guidance"]["time"] > end]) == {Phase.DOCKED}
+    assert set(trial["mission"]["phase"][trial["mission"]["time"] > end]) == {Phase.DOCKED}
     assert [kind for kind, _ in events(trial)].count("docked") == 1
 
 
@@ -325,8 +363,8 @@ def test_a_latched_vehicle_stays_latched() -> None:
 def test_docks_over_a_bad_link(pinned: Mapping, seed: int) -> None:
     """40 % drop-outs, 10 % outliers, 30 % out of order: docked within three attempts, and the link was that bad."""
     trial = run(seed, **pinned)
-    usbl, summary = trial["usbl"], metrics.summarise(trial)
-    assert summary.docked, summary.failure_text
+    usbl, found = trial["usbl"], summarise(trial)
+    assert found.docked, found.failure_text
     arrived = ~usbl["lost"]
     # Some sixty packets: 40 % +- 6 %, 10 % +- 4 %, 30 % +- 6 %, three deviations allowed.
     if "sensors" in pinned:
@@ -337,7 +375,7 @@ def test_docks_over_a_bad_link(pinned: Mapping, seed: int) -> None:
         assert 0.2 < usbl["lost"].mean() < 0.6
 
 
-def funnel_clearance(trial: TrialLog) -> np.ndarray:
+def funnel_clearance(trial: VehicleLog) -> np.ndarray:
     """Horizontal distance of the hull's axis from the funnel, as wide as its mouth and 2 m long, at each truth [m]."""
     nose, origin = (in_dock_frame(trial, place) for place in (nose_position(trial), trial["truth"]["position"]))
     distances = []
@@ -359,17 +397,17 @@ def test_goes_around_when_the_current_turns_before_the_dock(start: float, angle:
             "kind": "turning", "speed": 0.5, "direction_deg": 0.0, "angle_deg": angle, "start": start, "end": start + 10
         },
     )  # fmt: skip
-    summary = metrics.summarise(trial)
-    assert summary.docked
-    assert summary.attempts == 2
+    found = summarise(trial)
+    assert found.docked
+    assert found.attempts == 2
     (reason,) = [text for kind, text in events(trial) if kind == "go_around"]
     assert reason.startswith("entrance ")
     assert reason.endswith("; attempt 2 follows")
     # From the break-off on, no nearer than it already was (beside the dock), and without touching it.
-    around = metrics.phase_at(trial, trial["truth"]["time"]) == Phase.GO_AROUND
+    around = phase_at(trial, trial["truth"]["time"]) == Phase.GO_AROUND
     clearance = funnel_clearance(trial)[around]
     assert clearance.min() > min(2.0, clearance[0] - 0.5)
-    assert not (metrics.phase_at(trial, trial["contact"]["time"]) == Phase.GO_AROUND).any()
+    assert not (phase_at(trial, trial["contact"]["time"]) == Phase.GO_AROUND).any()
 
 
 def test_gives_up_when_the_dock_says_it_is_elsewhere() -> None:
@@ -381,18 +419,18 @@ def test_gives_up_when_the_dock_says_it_is_elsewhere() -> None:
     )
     reported = trial["usbl"]["value"][:, 6].mean() - 20.0
     assert 2.5 < abs(reported) < 15.0  # this seed's draw: clear of the dock, in the water
-    summary = metrics.summarise(trial)
-    assert (summary.docked, summary.attempts, summary.failure_reason) == (False, 3, "aborted")
-    assert summary.failure_text == "entrance passed without capture; attempt 3 was the last"
+    found = summarise(trial)
+    assert (found.docked, found.attempts, found.failure_reason) == (False, 3, "aborted")
+    assert found.failure_text == "entrance passed without capture; attempt 3 was the last"
     assert [kind for kind, _ in events(trial)].count("go_around") == 2
     assert len(trial["contact"]["time"]) == 0
 
 
 MEMORY = """
 import re
-from auvsim import sampling, scenario, trial
+from auvsim.simulation import run, sampling, scenario
 plan = scenario.parse(sampling.draw(sampling.default_plan(), 7))
-assert trial.run_trial(plan, seed=7).attributes["status"] == "complete"
+assert run.run(plan, seed=7).attributes["status"] == "complete"
 print(re.search(r"VmHWM:\\s+(\\d+) kB", open("/proc/self/status").read())[1])
 """
 

@@ -1,4 +1,4 @@
-"""`auvsim dock`: checks everything, runs one trial, leaves whole files."""
+"""`auvsim run` and `auvsim dock`: checks everything, runs a scenario, leaves whole files."""
 
 import sys
 from collections.abc import Iterator
@@ -8,41 +8,40 @@ from tempfile import TemporaryFile
 
 from auvsim.base.errors import InputError
 from auvsim.cli import products, report
-from auvsim.data.log import TrialLog, write
+from auvsim.data.log import Log
 from auvsim.simulation.scenario import Scenario
 
-PRODUCTS = ("summary.json", "track.png", "estimates.png", "docking.mp4")  # made from trial.nc
-
+LOG = "trial.nc"
+PRODUCTS = ("summary.json", "track.png", "estimates.png", "fleet.png", *products.VIDEOS)  # made from it
 COMPILING = "compiling {} (this once; later runs find the code in the cache)"
 WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 
 
-def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool) -> int:
-    """Runs the trial, fills the folder and returns the exit code."""
+def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, name: str = "docking") -> int:
+    """Runs the scenario, fills the folder and returns the exit code."""
+    path = out / LOG
     with output_folder(out):
-        log = simulate(scenario, seed, trial)
-        path = out / "trial.nc"
-        write(log, path)
-        for name in PRODUCTS:  # what an earlier trial left would not belong to this log
-            (out / name).unlink(missing_ok=True)
+        log = simulate(scenario, seed, trial, name, path)
+        for product in PRODUCTS:  # what an earlier run left would not belong to this log
+            (out / product).unlink(missing_ok=True)
     status = log.attributes["status"]
     if status == "interrupted":
-        print(f"auvsim: interrupted; {path} holds the trial up to there", file=sys.stderr)
+        print(f"auvsim: interrupted; {path} holds the run up to there", file=sys.stderr)
         return 130
     values = products.summary(log, out)
     if status == "diverged":
-        print(f"auvsim: {diagnosis(log)}; {path} holds the trial up to there", file=sys.stderr)
+        print(f"auvsim: {diagnosis(log)}; {path} holds the run up to there", file=sys.stderr)
         return 1
     products.plots(log, out)
     if video:
         _video(log, out)
-    report.table(values)
+    report.show(values)
     return 0
 
 
-def diagnosis(log: TrialLog) -> str:
-    """Why a trial diverged, from its log."""
-    event = log["event"]
+def diagnosis(log: Log) -> str:
+    """Why a run diverged, from its log."""
+    event = log.groups["event"]
     texts = [text for kind, text in zip(event["kind"], event["text"], strict=True) if kind == "diverged"]
     return str(texts[-1]) if texts else "the simulation diverged"
 
@@ -71,25 +70,25 @@ def output_folder(path: Path) -> Iterator[None]:
         raise
 
 
-def simulate(scenario: Scenario, seed: int, trial: int, name: str = "docking") -> TrialLog:
-    """Runs one trial with a progress bar of that name; says so if it has to compile first."""
+def simulate(scenario: Scenario, seed: int, trial: int, name: str, path: Path) -> Log:
+    """Runs a scenario into a file, with a progress bar of that name; says so if it has to compile first."""
     from auvsim.physics import fluid
-    from auvsim.simulation.trial import run_trial
+    from auvsim.simulation.run import run as run_scenario
 
     if not fluid.is_warm():
-        # A short trial calls, and so compiles, all that a long one does.
+        # A short run calls, and so compiles, all that a long one does.
         with report.waiting(COMPILING.format("hydrodynamics and estimator")):
             short = scenario.model_copy(update={"duration": min(scenario.duration, WARM_UP)})
-            if run_trial(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
+            if run_scenario(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
                 raise KeyboardInterrupt
     with report.TrialProgress(name) as progress:
-        return run_trial(scenario, seed=seed, trial=trial, progress=progress)
+        return run_scenario(scenario, seed=seed, trial=trial, progress=progress, path=path)
 
 
-def _video(log: TrialLog, out: Path) -> None:
+def _video(log: Log, out: Path) -> None:
     from auvsim.video import DrawingError
 
     try:
         products.video(log, out)
     except DrawingError:
-        print(products.NO_OPENGL.format(log=out / "trial.nc"), file=sys.stderr)
+        print(products.NO_OPENGL.format(log=out / LOG), file=sys.stderr)

@@ -10,19 +10,22 @@ from scipy.spatial.transform import Rotation
 from auvsim.base.errors import InputError
 from auvsim.physics import hydrodynamics
 from auvsim.vehicles import library
-from auvsim.vehicles.allocation import Allocation
+from auvsim.vehicles.actuation import Commands, FinsAndShaft
 
 LIMIT = 0.25
 SPEED, AREA, SLOPE, TAIL = 2.0, 0.00665, 0.5, -0.735  # through the water [m/s], of one fin [m2], lift, place [m]
-CROSS = Allocation(
-    names=("upper", "lower", "port", "starboard"),
+LIMITS = np.array([[-LIMIT, LIMIT]] * 4 + [[-160.0, 150.0]])
+CROSS = FinsAndShaft(
+    fins=("upper", "lower", "port", "starboard"),
     matrix=np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]]),
-    limit=LIMIT,
+    limits=LIMITS,
+    lags=np.zeros(5),
 )
-X_TAIL = Allocation(
-    names=("a", "b", "c", "d"),
+X_TAIL = FinsAndShaft(
+    fins=("a", "b", "c", "d"),
     matrix=np.array([[1.0, 1.0], [1.0, -1.0], [1.0, 1.0], [1.0, -1.0]]) * np.sqrt(0.5),
-    limit=LIMIT,
+    limits=LIMITS,
+    lags=np.zeros(5),
 )
 
 
@@ -30,24 +33,26 @@ X_TAIL = Allocation(
 def test_what_is_asked_for_is_what_the_fins_do(allocation):
     random = np.random.default_rng(0)
     for rudder, elevator in random.uniform(-0.17, 0.17, (20, 2)):  # 0.17 sqrt 2 is inside the limit
-        fins = allocation.fins(rudder, elevator)
-        assert fins == pytest.approx(allocation.matrix @ [rudder, elevator], abs=1e-15)
-        assert allocation.effective(fins) == pytest.approx((rudder, elevator), abs=1e-15)  # rounding
-        assert allocation.effective(np.array(fins)) == allocation.effective(fins)
+        channels = allocation.allocate(Commands(rudder, elevator, 300.0))  # the shaft's servo keeps its own limit
+        assert channels[:-1] == pytest.approx(allocation.matrix @ [rudder, elevator], abs=1e-15)
+        # Rounding; the shaft's speed passes as it is.
+        assert allocation.effective(channels) == pytest.approx((rudder, elevator, 300.0), abs=1e-15)
+        assert allocation.effective(np.array(channels)) == allocation.effective(channels)
 
 
 @pytest.mark.parametrize("allocation", [CROSS, X_TAIL], ids=["cross", "X"])
 def test_beyond_the_limit_all_fins_shrink_together(allocation):
     for rudder, elevator in ((0.5, 0.0), (-0.4, 0.3), (0.1, 1.0), (0.25, -0.25)):
-        fins = allocation.fins(rudder, elevator)
-        assert max(map(abs, fins)) <= LIMIT * (1 + 1e-15)
-        found = allocation.effective(fins)
+        channels = allocation.allocate(Commands(rudder, elevator, -70.0))
+        assert max(map(abs, channels[:-1])) == pytest.approx(LIMIT, rel=1e-15)
+        found = allocation.effective(channels)
+        assert found.shaft_speed == channels[-1] == -70.0  # not scaled with the fins
         assert found[0] * elevator == pytest.approx(found[1] * rudder, abs=1e-15)  # the same direction
         assert found[0] * rudder + found[1] * elevator > 0.0
 
 
 def test_disagreeing_fins_count_by_least_squares():
-    assert CROSS.effective([0.1, 0.2, 0.0, -0.1]) == pytest.approx((0.15, -0.05), abs=1e-15)
+    assert CROSS.effective([0.1, 0.2, 0.0, -0.1, 5.0]) == pytest.approx((0.15, -0.05, 5.0), abs=1e-15)
 
 
 @pytest.mark.parametrize(
@@ -55,13 +60,34 @@ def test_disagreeing_fins_count_by_least_squares():
 )
 def test_a_map_that_cannot_steer_both_ways_is_refused(matrix):
     with pytest.raises(InputError, match=r"allocation of 4 fins must be \(4, 2\) of rank 2"):
-        Allocation(names=CROSS.names, matrix=matrix, limit=LIMIT)
+        FinsAndShaft(fins=CROSS.fins, matrix=matrix, limits=LIMITS, lags=np.zeros(5))
+
+
+def test_limits_that_do_not_fit_are_refused():
+    with pytest.raises(InputError, match=r"4 fins and a shaft need limits \(5, 2\) and lags \(5,\), not \(4, 2\)"):
+        FinsAndShaft(fins=CROSS.fins, matrix=CROSS.matrix, limits=LIMITS[:-1], lags=np.zeros(5))
+    with pytest.raises(InputError, match="the limits of 'shaft' are 160 and -150; they must enclose 0"):
+        FinsAndShaft(
+            fins=CROSS.fins, matrix=CROSS.matrix, limits=LIMITS * np.array([[1.0]] * 4 + [[-1.0]]), lags=np.zeros(5)
+        )
+
+
+def test_unequal_limits_count_by_the_smallest():
+    limits = LIMITS.copy()
+    limits[2] = -0.2, 0.22
+    tail = FinsAndShaft(fins=CROSS.fins, matrix=CROSS.matrix, limits=limits, lags=np.zeros(5))
+    assert (tail.fin_limit, tail.shaft_limit) == (0.2, 150.0)
+    assert max(tail.allocate(Commands(0.5, 0.1, 0.0))) == pytest.approx(0.2)
+
+
+def test_what_may_be_demanded_is_what_commands_hold():
+    assert tuple(demand.name for demand in CROSS.demands) == Commands._fields
 
 
 def test_remus100_is_a_cross_tail():
-    allocation = library.vehicle("remus100").allocation
+    allocation = library.vehicle("remus100").actuation
     assert np.array_equal(allocation.matrix, CROSS.matrix)
-    assert allocation.limit == pytest.approx(np.radians(15.0), abs=1e-5)  # the model's printed digits
+    assert allocation.fin_limit == pytest.approx(np.radians(15.0), abs=1e-5)  # the model's printed digits
 
 
 def turned_tail(angle, path):
@@ -80,7 +106,7 @@ def turned_tail(angle, path):
             body.set("pos", text(turn.apply(numbers(body.get("pos")))))
             body.set("quat", text((w, x, y, z)))
             hinges[body.get("name")] = turned.apply((0.0, 0.0, 1.0))
-    axes = np.array([hinges[fin] for fin in library.vehicle("remus100").allocation.names])
+    axes = np.array([hinges[fin] for fin in library.vehicle("remus100").actuation.fins])
     fields = {"allocation_rudder": text(axes[:, 2]), "allocation_elevator": text(-axes[:, 1])}
     for numeric in root.iter("numeric"):
         if numeric.get("name").endswith("lift_slope"):
@@ -106,8 +132,8 @@ def tail_force(vehicle, rudder, elevator):
     data = mujoco.MjData(model)
     data.qvel[0] = SPEED
     forces = []
-    for fins in ([0.0] * 4, vehicle.allocation.fins(rudder, elevator)):
-        for name, angle in zip(vehicle.allocation.names, fins, strict=True):
+    for fins in ([0.0] * 4, vehicle.actuation.allocate(Commands(rudder, elevator, 0.0))[:-1]):
+        for name, angle in zip(vehicle.actuation.fins, fins, strict=True):
             data.joint(name).qpos[0] = angle
         mujoco.mj_forward(model, data)
         forces.append(data.qfrc_passive[:6].copy())
@@ -120,8 +146,8 @@ def tail_force(vehicle, rudder, elevator):
 def test_an_x_tail_steers_as_the_cross_tail_does(tmp_path, rudder, elevator):
     """The same effective angles give the same moments, by MuJoCo's forces on both and by hand."""
     cross, x_tail = (turned_tail(angle, tmp_path / f"{angle:.1f}.xml") for angle in (0.0, np.pi / 4))
-    assert np.abs(cross.allocation.matrix) == pytest.approx(CROSS.matrix, abs=1e-12)
-    assert np.abs(x_tail.allocation.matrix) == pytest.approx(X_TAIL.matrix[0, 0], abs=1e-12)
+    assert np.abs(cross.actuation.matrix) == pytest.approx(CROSS.matrix, abs=1e-12)
+    assert np.abs(x_tail.actuation.matrix) == pytest.approx(X_TAIL.matrix[0, 0], abs=1e-12)
     # Two fins' lift by the angle. To starboard: the stern is pushed to port; nose down: it is pushed up.
     lift = 2.0 * 0.5 * hydrodynamics.SEA_WATER * SPEED**2 * AREA * SLOPE
     force = lift * np.array([0.0, rudder, elevator])
@@ -129,7 +155,7 @@ def test_an_x_tail_steers_as_the_cross_tail_does(tmp_path, rudder, elevator):
     # Lift goes with sin(alpha) cos(alpha), two thirds of alpha^2 less than alpha: at 0.08 rad, 0.4 % of it.
     tolerance = 0.005 * 0.08 * lift
     for vehicle in (cross, x_tail):
-        assert vehicle.allocation.effective(vehicle.allocation.fins(rudder, elevator)) == pytest.approx(
-            (rudder, elevator), abs=1e-12
-        )
+        assert vehicle.actuation.effective(
+            vehicle.actuation.allocate(Commands(rudder, elevator, 9.0))
+        ) == pytest.approx((rudder, elevator, 9.0), abs=1e-12)
         assert tail_force(vehicle, rudder, elevator)[1:] == pytest.approx(expected, abs=tolerance)

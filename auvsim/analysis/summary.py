@@ -1,0 +1,58 @@
+"""A vehicle's run in a few numbers, as plain values for strict JSON."""
+
+import dataclasses
+import math
+from typing import Any
+
+from auvsim.analysis.estimates import estimate_errors, estimate_quality
+from auvsim.data.attributes import WALL_TIME
+from auvsim.data.log import Log, VehicleLog
+from auvsim.missions.docking.metrics import end_of
+from auvsim.missions.registry import MISSIONS, find
+
+
+def summarise(log: VehicleLog) -> dict[str, Any]:
+    """Status, what the mission is judged by, quality of the estimate, fates of fixes, speed of the run.
+
+    What is not a finite number is None.
+    """
+    errors = estimate_errors(log)
+    values = {"status": str(log.log.attributes["status"]), "mission": log.mission, "time": end_of(log)}
+    values |= find(log.mission).metrics(log) if log.mission in MISSIONS else _of_its_own(log)
+    values["estimate"] = {
+        phase: dataclasses.asdict(quality) for phase, quality in estimate_quality(errors, log.phases).items()
+    }
+    if "usbl" in log:
+        usbl = log["usbl"]
+        values |= {
+            "fixes_sent": len(usbl["time"]),
+            "fixes_lost": int(usbl["lost"].sum()),
+            "fixes_outliers": int((usbl["outlier"] & ~usbl["lost"]).sum()),
+        }
+    values["fixes_refused"] = int(log["estimate"]["refused"].max(initial=0))
+    end, wall = end_of(log), float(log.log.attributes.get(WALL_TIME, math.nan))
+    values["real_time_factor"] = end / wall if wall > 0.0 else None
+    return _plain(values)
+
+
+def summarise_all(log: Log) -> dict[str, Any]:
+    """The summary of the only vehicle; of several, by name."""
+    if len(log.vehicles) == 1:
+        return summarise(log.vehicle())
+    return {"status": str(log.attributes["status"]), "vehicles": {n: summarise(log.vehicle(n)) for n in log.vehicles}}
+
+
+def _of_its_own(log: VehicleLog) -> dict[str, Any]:
+    """Metrics of a mission of the user's own; none where its class cannot be found here."""
+    try:
+        return find(log.mission).metrics(log)
+    except Exception:  # a user's class may be missing, or fail in any way
+        return {}
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, dict):
+        return {key: _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value

@@ -1,0 +1,1 @@
+"""Tracks: waypoints, lawn-mowers and the like, followed by line of sight."""

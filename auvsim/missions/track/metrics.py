@@ -1,0 +1,39 @@
+"""Metrics of a track: pure functions of its log."""
+
+import math
+from typing import Any
+
+import numpy as np
+
+from auvsim.base import yaml_text
+from auvsim.data.log import VehicleLog
+from auvsim.missions.track import patterns
+
+
+def track_metrics(log: VehicleLog) -> dict[str, Any]:
+    """Whether the track was finished, how many waypoints were reached, and the true distance from its legs, rms.
+
+    The transit to the first waypoint is not a leg of the track and does not count.
+    """
+    mission, truth = log["mission"], log["truth"]
+    settings = yaml_text.read(str(log.attributes["mission_settings"]), "log").value
+    pattern = settings["pattern"]
+    kind = patterns.LawnMower if pattern["kind"] == "lawn_mower" else patterns.Waypoints
+    points = patterns.points(kind(**pattern))
+    reached = int((log["event"]["kind"] == "waypoint").sum())
+    under_way = np.flatnonzero(mission["phase"] == 1)
+    squares = []
+    if len(under_way):
+        ahead = np.interp(truth["time"], mission["time"][under_way], mission["waypoint"][under_way]).round().astype(int)
+        first, last = mission["time"][under_way[[0, -1]]]
+        for leg in range(1, len(points)):
+            part = (ahead == leg) & (truth["time"] >= first) & (truth["time"] <= last)
+            begin, way = points[leg - 1], points[leg] - points[leg - 1]
+            off = truth["position"][part, :2] - begin
+            squares.append(((way[0] * off[:, 1] - way[1] * off[:, 0]) / math.hypot(*way)) ** 2)
+    all_squares = np.concatenate(squares) if squares else np.empty(0)
+    return {
+        "finished": reached == len(points),
+        "waypoints": reached,
+        "cross_track_rms": float(np.sqrt(all_squares.mean())) if len(all_squares) else None,
+    }

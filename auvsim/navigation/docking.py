@@ -1,0 +1,199 @@
+"""Adapters of the docking estimators to the contract of a run: readings in, estimates out."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base.alpha_beta import AlphaBeta
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array, wrap
+from auvsim.base.reading import Reading
+from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.vehicles.actuation import Commands, FinsAndShaft
+from estimators.core.outliers import Outliers
+from estimators.docking.estimator import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
+from estimators.docking.models import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
+from estimators.docking.usbl import UsblFix, UsblModel
+
+TURN = 10.0  # mean duration of a turn of the current that the interacting filters expect [s]
+SETTLING = 50.0  # mean time after it for which its memory is kept apart [s]
+DEPTH_GAINS = (0.09, 0.0042)  # of the depth gauge's alpha-beta filter, steady state for 0.05 m and 0.02 m/s2
+# An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the start of a turn.
+GROSS = Outliers(prior=0.02, deviations=(15.0,))
+ANY = Outliers(prior=0.03, deviations=(2.0, 15.0))  # where fixes may be wrong by a few metres all the same
+
+
+class DockingNavigator:
+    """A docking estimator in a run.
+
+    Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the
+    gauge's, smoothed.
+
+    Args:
+        estimator: in whose axes the dock's mouth is the origin.
+        actuation: of the vehicle.
+        dock: (2,) north, east of the dock's mouth [m].
+    """
+
+    states = PLANAR_STATES
+
+    def __init__(self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array) -> None:
+        self._estimator, self._actuation, self._dock = estimator, actuation, dock
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._estimator.reset()
+        self._depth = AlphaBeta(*DEPTH_GAINS)
+        self._yaw_rate = 0.0
+
+    def update(
+        self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
+    ) -> Estimate:
+        """The estimate at `time`, see `Navigator.update`."""
+        headings, stamps, drives, fixes = [], [], [], []
+        for reading in readings:
+            if reading.sensor == "compass":
+                headings.append(float(reading.value[0]))
+                stamps.append(reading.stamp)
+            elif reading.sensor == "feedback":
+                drives.append(reading.value.tolist())
+            elif reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+            elif reading.sensor == "usbl":
+                x, y, z, heading, pitch, roll, _ = reading.value.tolist()
+                fix = UsblFix(
+                    stamp=reading.stamp, received=reading.received, sequence=reading.sequence,
+                    position=(x, y, z), heading=heading, pitch=pitch, roll=roll,
+                )  # fmt: skip
+                fixes.append(fix)
+        rudder, shaft_speed = commands.rudder, commands.shaft_speed
+        if drives:
+            rudder, _, shaft_speed = self._actuation.effective(
+                [sum(values) / len(drives) for values in zip(*drives, strict=True)]
+            )
+        result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
+        mean = result.mean.copy()
+        mean[:2] += self._dock
+        self._yaw_rate = float(mean[5])
+        return Estimate(
+            time=time,
+            position=np.array([mean[0], mean[1], self._depth.at(time) or 0.0]),
+            heading=float(mean[2]),
+            velocity=mean[3:6],
+            current=mean[6:8],
+            covariance=result.covariance,
+            initialised=result.initialised,
+            mean=mean,
+            refused=sum(result.refused.values()),
+            reasons=result.refused,
+            reinitialised=result.reinitialised,
+            outcomes=result.outcomes,
+        )
+
+    def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:
+        if not headings:
+            return None
+        first = headings[0]
+        offsets = [wrap(h - first) + self._yaw_rate * (time - t) for h, t in zip(headings, stamps, strict=True)]
+        return wrap(first + sum(offsets) / len(offsets))
+
+
+def navigator(
+    setup: NavigatorSetup, kind: Callable[..., Any], base: DockingNoise, *, delayed: bool = True
+) -> DockingNavigator:
+    """A docking filter for a vehicle; what it assumes are the estimator's settings, never the sensors' draws."""
+    s, actuation = setup.settings, setup.actuation
+    if setup.dock is None:
+        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': needs the USBL of a dock; give a structure")
+    if not isinstance(actuation, FinsAndShaft):
+        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft")
+    readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
+    noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings))
+    white = 0.0 if "dock_heading" in base.biases else math.radians(s.dock_heading_deg)
+    model = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=white)
+    filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2])
+    estimator = DockingEstimator(filter_, model, step=setup.period, compensate_delay=delayed)
+    return DockingNavigator(estimator, actuation, setup.dock.position[:2])
+
+
+def regular_ekf(setup: NavigatorSetup) -> Navigator:
+    """The regular filter: knows neither delay nor current, with the noise that suits such a filter best."""
+    return navigator(setup, partial(PaperFilter, weights=None), REGULAR_NOISE, delayed=False)
+
+
+def delay_only(setup: NavigatorSetup) -> Navigator:
+    """Half of paper 1's filter: the delay buffer (sections 8 and 9), and no current."""
+    return navigator(setup, partial(PaperFilter, weights=None), REGULAR_NOISE)
+
+
+def current_only(setup: NavigatorSetup) -> Navigator:
+    """The other half: the current by eq. 11, with fixes taken as made when they arrive."""
+    return navigator(setup, PaperFilter, PAPER_NOISE, delayed=False)
+
+
+def paper(setup: NavigatorSetup) -> Navigator:
+    """Paper 1's improved filter (sections 6 to 10), with the noises it recommends."""
+    return navigator(setup, PaperFilter, PAPER_NOISE)
+
+
+def augmented_ekf(setup: NavigatorSetup) -> Navigator:
+    """The augmented extended Kalman filter in the delay buffer (paper 1, sections 8 and 12)."""
+    return navigator(setup, AugmentedFilter, _noise(setup.settings))
+
+
+def ukf(setup: NavigatorSetup) -> Navigator:
+    """The augmented filter with sigma points instead of derivatives."""
+    return navigator(setup, partial(AugmentedFilter, transform="unscented"), _noise(setup.settings))
+
+
+def imm(setup: NavigatorSetup) -> Navigator:
+    """Interacting augmented filters, for steady and turning currents (paper 1, section 13), with the compass' error."""
+    return _interacting(setup, {}, GROSS)
+
+
+def imm_biased(setup: NavigatorSetup) -> Navigator:
+    """Interacting filters for worse sensors: errors of thrust and of a poor compass in the state, small outliers.
+
+    It notices a turn later than `imm`, which takes fixes that are wrong by a few metres for one, and so errs up to 1.4
+    times as much in it.
+    """
+    return _interacting(setup, BIASES_OF_VEHICLE, ANY)
+
+
+def _interacting(setup: NavigatorSetup, biases: Mapping[str, Bias], outliers: Outliers) -> Navigator:
+    """Three modes: steady, turning, and steady again after a turn.
+
+    The third mode keeps the large covariance of a turn out of the steady mode: after a turn, a filter stays in it long
+    enough to converge, so that the steady mode's covariance is only ever mixed with one that has converged.
+    """
+    s = setup.settings
+    noise = _noise(s)
+    compass = {"compass": Bias(math.radians(s.compass_bias_deg))} if s.compass_bias_deg > 0.0 else {}
+    turns, ends, settles = 1.0 / s.turn_interval, 1.0 / TURN, 1.0 / SETTLING
+    shares = np.array((1.0, turns / settles, turns / ends))  # nearly those of the chain when it has run for long
+    kind = partial(
+        InteractingFilter,
+        currents=(s.steady_noise, s.steady_noise, s.turning_noise),
+        switching=((0.0, 0.0, turns), (settles, 0.0, turns), (0.0, ends, 0.0)),
+        initial=shares / shares.sum(),
+        outliers=outliers,
+    )
+    return navigator(setup, kind, replace(noise, biases={**compass, **biases, **noise.biases}))
+
+
+def _noise(s: Any) -> DockingNoise:
+    """What a filter with the current in its state assumes."""
+    constant = s.dock_heading_state and s.dock_heading_deg > 0.0  # a state without variance is none
+    return DockingNoise(
+        position=s.position_noise, heading=s.heading_noise, surge=s.velocity_noise, sway=s.velocity_noise,
+        yaw_rate=s.yaw_rate_noise, current=s.current_noise,
+        biases={"dock_heading": Bias(math.radians(s.dock_heading_deg))} if constant else {},
+    )  # fmt: skip

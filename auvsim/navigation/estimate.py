@@ -1,0 +1,65 @@
+"""An estimate: named states with covariance, the views that control and plots use, outcomes of measurements."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+
+from auvsim.base.frames import Array
+from estimators.core.types import Outcome
+
+# The planar states of a rudder-driven vehicle and their units; estimators of other states name their own.
+PLANAR_STATES: Mapping[str, str] = MappingProxyType(
+    {
+        "north": "m",
+        "east": "m",
+        "heading": "rad",
+        "surge": "m/s",
+        "sway": "m/s",
+        "yaw_rate": "rad/s",
+        "current_north": "m/s",
+        "current_east": "m/s",
+    }
+)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Estimate:
+    """Estimated state of a vehicle at one instant, in NED from the datum."""
+
+    time: float  # [s]
+    position: Array  # (3,) north, east, depth of the body origin [m]
+    heading: float  # [rad]
+    velocity: Array  # (3,) surge, sway [m/s] and yaw rate [rad/s], through the water
+    current: Array  # (2,) north, east [m/s]
+    covariance: Array  # (n, n) of the states; zeros where not estimated
+    initialised: bool  # false until position is known
+    mean: Array | None = None  # (n,) of the states; None: the eight planar ones, as the views say
+    refused: int = 0  # measurements refused so far
+    reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
+    reinitialised: int = 0  # number of restarts after its numbers were no longer finite
+    outcomes: tuple[Outcome, ...] = ()  # of the measurements accepted or refused since the last estimate
+
+    @property
+    def state(self) -> Array:
+        """(n,) mean of the named states."""
+        if self.mean is not None:
+            return self.mean
+        return np.array((*self.position[:2], self.heading, *self.velocity, *self.current))
+
+    @property
+    def horizontal_covariance(self) -> Array:
+        """(2, 2) of north and east [m2], which are the first two states."""
+        return self.covariance[:2, :2]
+
+
+def estimator_events(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:
+    """Kinds and texts of the events between two estimates: measurements refused, by reason, and starts anew."""
+    known, events = before.reasons if before else {}, []
+    for reason, count in now.reasons.items():
+        if (more := count - known.get(reason, 0)) > 0:
+            events.append(("refused", f"{more} measurement{'s' * (more > 1)}: {reason.replace('_', ' ')}"))
+    if now.reinitialised > (before.reinitialised if before else 0):
+        events.append(("reinitialised", "the estimator started anew: its numbers were no longer finite"))
+    return events

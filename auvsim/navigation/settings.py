@@ -1,0 +1,78 @@
+"""Settings of the estimators by kind: the noise and the model that each assumes."""
+
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag
+
+from auvsim.base.settings import OwnPart, Settings, tag_by_kind
+
+
+class _Assumed(Settings):
+    """The planar model that an estimator assumes."""
+
+    model: str = Field(
+        default="condense",
+        description="planar model: condense (fitted to MuJoCo's vehicle), a name in models/<vehicle>/planar/, a .yaml",
+    )
+    model_speed: float = Field(
+        default=1.0, gt=0, description="speed through the water at which the planar model is fitted [m/s]"
+    )
+
+
+class PaperSettings(_Assumed):
+    """Paper 1's filter and its halves, with the noises that the paper recommends."""
+
+    kind: Literal["paper", "current_only", "delay_only", "regular_ekf"] = "paper"
+    compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="assumed error of the dock's compass, sd [deg]")
+
+
+class AugmentedSettings(_Assumed):
+    """Kalman filters with the current in their state."""
+
+    kind: Literal["augmented_ekf", "ukf"] = Field(
+        default="augmented_ekf",
+        description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, or "
+        "package.module:factory",
+    )
+    compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
+    position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
+    heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
+    velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_rate_noise: float = Field(default=1e-5, ge=0, description="process noise of yaw rate [rad2/s3]")
+    current_noise: float = Field(
+        default=3e-6, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
+    )
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="assumed error of the dock's compass, sd [deg]")
+    dock_heading_state: bool = Field(
+        default=True, description="whether that error is a constant, which is estimated, or white noise of each fix"
+    )
+
+
+class InteractingSettings(AugmentedSettings):
+    """Interacting filters, for currents that may turn."""
+
+    kind: Literal["imm", "imm_biased"] = "imm"  # pyright: ignore[reportIncompatibleVariableOverride]
+    steady_noise: float = Field(
+        default=1e-6, ge=0, description="random walk of the current in the steady modes of the imm [m2/s3]"
+    )
+    turning_noise: float = Field(
+        default=0.02, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
+    )
+    turn_interval: float = Field(default=300.0, gt=0, description="mean time between turns that the imm assumes [s]")
+    compass_bias_deg: float = Field(
+        default=0.5, ge=0, description="assumed compass bias, which the imm estimates, sd [deg]"
+    )
+
+
+class OwnEstimator(OwnPart, _Assumed):
+    """An estimator of the user's own, made by a factory."""
+
+
+EstimatorSettings = Annotated[
+    Annotated[AugmentedSettings, Tag("AugmentedSettings")]
+    | Annotated[InteractingSettings, Tag("InteractingSettings")]
+    | Annotated[PaperSettings, Tag("PaperSettings")]
+    | Annotated[OwnEstimator, Tag("OwnEstimator")],
+    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, OwnEstimator)),
+]

@@ -1,0 +1,119 @@
+"""One vehicle inside MuJoCo's arrays."""
+
+import math
+from collections.abc import Sequence
+
+import mujoco
+import numpy as np
+
+from auvsim.base.frames import (
+    FLIP,
+    FLIP6,
+    FLIP_QUATERNION,
+    Array,
+    euler_to_quaternion,
+    flip,
+    flip_quaternion,
+)
+from auvsim.physics import water_slot
+from auvsim.physics.fluid import WATER
+from auvsim.physics.truth import Truth
+from auvsim.vehicles import library
+from auvsim.water.currents import CurrentField
+from auvsim.water.surface import surface
+
+
+class Craft:
+    """Views of MuJoCo's arrays that belong to one vehicle, and what is read from and written to them.
+
+    The arrays stay where they are: to ask `MjData` for one costs as much as a calculation.
+
+    Args:
+        model: the compiled scene.
+        data: its state.
+        name: instance name of the vehicle.
+        vehicle: its model.
+        slot: offset of its water in `mjData.userdata`.
+    """
+
+    def __init__(
+        self, model: mujoco.MjModel, data: mujoco.MjData, name: str, vehicle: library.Vehicle, slot: int
+    ) -> None:
+        self.name, self.vehicle = name, vehicle
+        joint = model.joint(f"{name}/")
+        q, v = int(joint.qposadr[0]), int(joint.dofadr[0])
+        base = int(model.body(f"{name}/").id)
+        dofs = np.flatnonzero(model.body_rootid[model.dof_bodyid] == base)
+        self.dofs = slice(int(dofs[0]), int(dofs[-1]) + 1)
+        positions = [int(at) for at in model.jnt_qposadr[model.dof_jntid[dofs[6:]]]]  # of its hinges
+        self._hinges = slice(min(positions), max(positions) + 1) if positions else slice(0, 0)
+        self.position, self._quaternion = data.qpos[q : q + 3], data.qpos[q + 3 : q + 7]
+        self._velocity, self.speeds = data.qvel[v : v + 6], data.qvel[self.dofs]
+        self._data, self._qpos, self._qvel, self._control = data, data.qpos, data.qvel, data.ctrl
+        self._water = data.userdata[slot : slot + WATER]
+        actuators = [model.actuator(f"{name}/{channel}") for channel in vehicle.actuation.channels]
+        joints = [int(actuator.trnid[0]) for actuator in actuators]
+        self._controls = [int(actuator.id) for actuator in actuators]
+        self._angles = model.jnt_qposadr[joints]
+        # A velocity servo has no stiffness: its channel is a rate, any other's an angle.
+        self._turning = [
+            (channel, int(self._angles[channel]), int(model.jnt_dofadr[joint]))
+            for channel, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
+            if actuator.biasprm[1] == 0.0
+        ]
+        self._rotation = np.zeros(9)
+        self._matrix = self._rotation.reshape(3, 3)
+
+    def place(self, position: Array, heading: float, velocity: Array, channels: Array) -> None:
+        """Puts the vehicle level at a place.
+
+        Args:
+            position: (3,) NED [m].
+            heading: [rad].
+            velocity: (3,) over ground, NED [m/s].
+            channels: (n,) commands, which the actuators already carry out.
+        """
+        self.speeds[:] = 0.0
+        self._qpos[self._hinges] = 0.0
+        self.position[:] = flip(position)
+        self._quaternion[:] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
+        self._velocity[:3] = flip(velocity)
+        self._qpos[self._angles] = channels
+        for channel, angle, rate in self._turning:
+            self._qpos[angle], self._qvel[rate] = 0.0, channels[channel]
+        self._control[self._controls] = channels
+
+    def command(self, channels: Sequence[float]) -> None:
+        """Sets the commands (n,) of the actuators."""
+        control = self._control
+        for index, value in zip(self._controls, channels, strict=True):
+            control[index] = value
+
+    def refresh_water(self, current: CurrentField, time: float) -> None:
+        """Writes the water round the vehicle, and the surface above it, where the fluid callback reads them."""
+        place = flip(self.position)
+        water, above = current.evaluate(time, place), surface(current, time, place)
+        water_slot.fill(self._water, time, self.position, water, above)
+
+    def truth(self, current: CurrentField) -> Truth:
+        """The true state now, in NED and forward-starboard-down."""
+        time = self._data.time
+        position = self.position * FLIP
+        quaternion = self._quaternion * FLIP_QUATERNION
+        mujoco.mju_quat2Mat(self._rotation, quaternion)
+        r00, _, _, r10, _, _, r20, r21, r22 = self._rotation.tolist()
+        nu = self._velocity * FLIP6
+        over_ground = nu[:3]
+        over_ground[:] = over_ground.dot(self._matrix)
+        actuators = self._qpos.take(self._angles)
+        for channel, _, rate in self._turning:
+            actuators[channel] = self._qvel[rate]
+        return Truth(
+            time=time,
+            position=position,
+            quaternion=quaternion,
+            attitude=np.array((math.atan2(r21, r22), -math.asin(max(-1.0, min(1.0, r20))), math.atan2(r10, r00))),
+            nu=nu,
+            current=current.evaluate(time, position).velocity,
+            actuators=actuators,
+        )

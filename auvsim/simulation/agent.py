@@ -1,0 +1,258 @@
+"""The agent of one vehicle: its sensors, estimator, mission and controller, and one step of each."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol
+
+from numpy.random import Generator
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base import plugins
+from auvsim.base.reading import Reading
+from auvsim.control import registry as controllers
+from auvsim.control.controller import ControllerSetup
+from auvsim.data.variables import Group, Table, Variable, vehicle_groups
+from auvsim.missions import registry as missions
+from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
+from auvsim.navigation import registry as estimators
+from auvsim.navigation.estimate import Estimate, estimator_events
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.physics import planar_sets
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.truth import Truth
+from auvsim.sensors import registry as sensors
+from auvsim.sensors.sensor import Surroundings
+from auvsim.simulation import parts
+from auvsim.simulation.parts import Part
+from auvsim.simulation.scenario import Scenario
+from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.vehicles.library import Vehicle
+
+
+class Log(Protocol):
+    """What an agent logs to; `data.recorder.Recorder` is one."""
+
+    def append(self, group: str, row: Sequence[Any]) -> None:
+        """A row of a group."""
+        ...
+
+    def reading(self, vehicle: str, reading: Reading, *extra: Any) -> None:
+        """A reading of a sensor."""
+        ...
+
+    def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
+        """Something that happened."""
+        ...
+
+
+class Agent:
+    """A vehicle that senses, navigates and acts.
+
+    Args:
+        name: of the vehicle.
+        plan: the scenario.
+        vehicle: its model.
+        places: the structures that are charted, by name.
+        noise: gives the generator of each source of noise of this vehicle.
+        navigator: in place of the scenario's.
+        mission: likewise.
+
+    Raises:
+        InputError: one of its parts cannot be made.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        plan: Scenario,
+        vehicle: Vehicle,
+        places: Mapping[str, Place],
+        noise: Callable[[str], Generator],
+        *,
+        navigator: Navigator | None = None,
+        mission: Mission | None = None,
+    ) -> None:
+        self.name, self.vehicle = name, vehicle
+        settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
+        start, assumed = settings.start, settings.estimator
+        model_speed = getattr(assumed, "model_speed", 1.0)
+        # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
+        # estimator.
+        fitted = fit_planar_model(settings.model, model_speed, density)
+        self.shaft_speed = fitted.shaft_speed_for
+        heading = math.radians(start.heading_deg)
+        self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
+        self.navigator = navigator or estimators.build(
+            NavigatorSetup(
+                vehicle=name,
+                settings=assumed,
+                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
+                actuation=vehicle.actuation,
+                period=1.0 / rates.filter,
+                rates=dict(rated(settings.sensors)),
+                usbl=settings.sensors.usbl,
+                dock=places[self.dock].pose if self.dock else None,
+            )
+        )
+        self.mission = mission or missions.build(
+            settings.mission.kind,
+            MissionSetup(
+                name=name,
+                settings=settings.mission,
+                vehicle=vehicle,
+                heading=heading,
+                depth=start.depth,
+                period=1.0 / rates.control,
+                holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
+                structures=places,
+            ),
+        )
+        self.controller = controllers.build(
+            settings.control.kind,
+            ControllerSetup(
+                settings=settings.control,
+                actuation=vehicle.actuation,
+                shaft_speed=fitted.shaft_speed_for,
+                period=1.0 / rates.control,
+            ),
+        )
+        self.sensors = [
+            (
+                _sensor(key, found, noise(key), vehicle),
+                round(rates.control / found.rate),
+                Part("sensor", getattr(found, "kind", key), name),
+            )
+            for key, found in on_board(settings.sensors)
+        ]
+        # Whatever is given in place of the scenario's part is the caller's, who sees what it raises.
+        self._estimator = Part("estimator", "" if navigator else assumed.kind, name)
+        self._mission = Part("mission", "" if mission else settings.mission.kind, name)
+        self._controller = Part("controller", settings.control.kind, name)
+        self.estimate: Estimate | None = None
+        self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
+        self._filter_ticks = round(rates.control / rates.filter)
+        self._readings: list[Reading] = []  # of this control period
+        self._messages: list[Delivery] = []
+        self._to_filter: list[Reading] = []  # since the last update of the estimator
+        self._messages_to_filter: list[Delivery] = []
+        self._to_mission: list[Reading] = []  # since the last update of the mission
+        self._end = math.inf
+        self.over = False
+        self._running = self._controller  # the part whose code runs now, to blame for what it raises
+        self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
+        groups = ("estimate", "measurements", "mission", "command")
+        self._estimates, self._measurements, self._decisions, self._commands = (f"vehicles/{name}/{g}" for g in groups)
+
+    def blame(self, error: BaseException) -> BaseException:
+        """What to raise in place of an error from within this agent: a user's own part is named."""
+        return self._running.blamed(error)
+
+    def groups(self, usbl: tuple[Table, Mapping[str, int]] | None) -> dict[str, Group]:
+        """The groups of the vehicle in the log.
+
+        Args:
+            usbl: variables and sizes of the dock's USBL, if one serves the vehicle.
+        """
+        actuation = self.vehicle.actuation
+        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _, _ in self.sensors}
+        of_sensors |= {"usbl": usbl} if usbl else {}
+        return vehicle_groups(
+            sensors=of_sensors,
+            mission=(self.mission.phases, self.mission.variables),
+            demands={d.name: Variable((), "float64", d.units, d.long_name) for d in actuation.demands},
+            channels=dict(zip(actuation.channels, actuation.units, strict=True)),
+            states=self.navigator.states,
+        )
+
+    def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
+        """Takes the readings that are due at a control tick."""
+        self._readings, self._messages = [], []
+        for sensor, every, part in self.sensors:
+            if ticks % every:
+                continue
+            self._running = part
+            reading = sensor.measure(truth, world)
+            if reading is not None:
+                if part.own:
+                    parts.reading(reading, sensor)
+                log.reading(self.name, reading)
+                self._readings.append(reading)
+
+    def receive(self, deliveries: Sequence[Delivery]) -> None:
+        """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
+        for delivery in deliveries:
+            self._messages.append(delivery)
+            if delivery.message.kind == "usbl":
+                self._readings.append(delivery.message.payload.reading._replace(received=delivery.received))
+
+    def navigate(self, ticks: int, time: float, log: Log) -> None:
+        """Hands all that arrived to the controller and, when it is due, to the estimator."""
+        self._running = self._controller
+        self.controller.observe(self._readings)
+        self._to_filter += self._readings
+        self._to_mission += self._readings
+        self._messages_to_filter += self._messages
+        # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
+        self._running = self._mission
+        if self.mission.at_rest or ticks % self._filter_ticks:
+            return
+        self._running = self._estimator
+        e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+        if self._estimator.own:
+            parts.estimate(e, len(self.navigator.states))
+        self._to_filter, self._messages_to_filter = [], []
+        for kind, text in estimator_events(self.estimate, e):
+            log.event(time, self.name, kind, text)
+        self.estimate = e
+        views = (e.position, e.heading, e.velocity, e.current)
+        log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
+        for o in e.outcomes:
+            log.append(self._measurements, (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
+
+    def act(self, time: float, latched: str | None, log: Log) -> Any:
+        """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""
+        mission, controller = self.mission, self.controller
+        self._running = self._controller
+        heading, depth = controller.heading, controller.depth
+        if self._controller.own:
+            parts.smoothed(heading, depth)
+        if heading is None or depth is None:
+            return None
+        readings, self._to_mission = self._to_mission, []
+        self._running = self._mission
+        wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
+        if self._mission.own:
+            parts.mission(mission, wanted)
+        row = mission.row()
+        self._running = self._controller
+        self.commands = controller.command(wanted)
+        if self._controller.own:
+            parts.demand(self.commands, self._demands)
+        log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
+        log.append(self._commands, (time, *self.commands))
+        for event in mission.events:
+            log.event(event.time, self.name, event.kind, event.text)
+        mission.events.clear()
+        if mission.finished and self._end == math.inf:
+            self._end = time + mission.aftermath
+        self.over = time >= self._end
+        return self.commands
+
+    @property
+    def approach(self) -> int | None:
+        """Number of the mission's approach under way, see `Mission`."""
+        self._running = self._mission
+        return self.mission.approach
+
+    def overdue(self, duration: float) -> str:
+        """What the log says when the time limit [s] of the run ends the mission."""
+        self._running = self._mission
+        return str(self.mission.overdue(duration))
+
+
+def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:
+    """A sensor by its name and settings; a standard one's kind is its name."""
+    kind = getattr(settings, "kind", name)
+    if plugins.is_own(kind):
+        settings = plugins.settings_of(sensors.find(kind), settings.settings, f"sensor '{name}': settings")
+    return sensors.build(kind, settings, generator, name=name, vehicle=vehicle)

@@ -1,0 +1,386 @@
+"""The one closed loop: the world moves; every agent senses, navigates and acts; all of it is logged."""
+
+import hashlib
+import math
+import os
+import time as wall
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.random import Generator
+
+from auvsim.acoustics.link import Channel
+from auvsim.acoustics.network import Network
+from auvsim.acoustics.usbl import Usbl
+from auvsim.base import yaml_text
+from auvsim.base.errors import DivergenceError
+from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
+from auvsim.base.reading import Reading
+from auvsim.data.log import Log
+from auvsim.data.recorder import Recorder
+from auvsim.data.variables import run_groups
+from auvsim.missions.mission import Mission, Place
+from auvsim.navigation.navigator import Navigator
+from auvsim.physics import scenes, soundness
+from auvsim.physics.truth import Truth
+from auvsim.physics.world import World
+from auvsim.simulation.agent import Agent
+from auvsim.simulation.parts import PartError
+from auvsim.simulation.scenario import Scenario, to_yaml
+from auvsim.vehicles import library
+from auvsim.water.currents import CurrentField, build_current, listeners
+
+
+class ProgressState(NamedTuple):
+    """Progress of a running simulation."""
+
+    time: float  # [s]
+    duration: float  # its time limit [s]
+    phase: str  # of the vehicle's mission; of several, each with its name
+    range: float  # true distance of the first vehicle from its dock's mouth [m]; NaN without one
+
+
+def run(
+    scenario: Scenario,
+    *,
+    seed: int = 0,
+    trial: int = 0,
+    progress: Callable[[ProgressState], None] | None = None,
+    path: str | os.PathLike[str] | None = None,
+    check_step: bool = True,
+) -> Log:
+    """Runs a scenario and returns its log, also when it diverges or is interrupted.
+
+    Args:
+        scenario: every number definite.
+        seed: of all random streams.
+        trial: number of the run under that seed.
+        progress: called about ten times a simulated minute.
+        path: file of the log, which grows during the run; None keeps the log in memory.
+        check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
+
+    Raises:
+        InputError: a model, a part or a number of the scenario cannot be used.
+    """
+    started = wall.perf_counter()
+    if check_step:
+        check_steps(scenario)
+    simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
+    log: Any = simulation.log
+    with log:
+        try:
+            last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
+            while simulation.ticks < last and not simulation.over:
+                simulation.step()
+                if progress and simulation.ticks % simulation.progress_ticks == 0:
+                    progress(simulation.progress())
+            for agent in simulation.agents:
+                if not agent.over:
+                    log.event(
+                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
+                    )
+        except DivergenceError as error:
+            status = "diverged"
+            log.event(simulation.time, "", "diverged", str(error))
+            if isinstance(error, PartError):
+                log.event(simulation.time, "", "traceback", error.trace)
+        except KeyboardInterrupt:
+            status = "interrupted"
+            log.event(simulation.time, "", "interrupted", "stopped by the user")
+        simulation.log_contacts()
+        return log.finish(status, wall_time=wall.perf_counter() - started)
+
+
+class Simulation:
+    """The parts of a run, and its loop, one control period a step.
+
+    Args:
+        scenario: every number definite.
+        seed: of all random streams.
+        trial: number of the run under that seed.
+        world: replaces MuJoCo's world; anything with the methods of `World`.
+        navigators: replace the scenario's estimators, by vehicle.
+        missions: replace the scenario's missions, by vehicle.
+        agents: makes the agent of a vehicle, see `Agent`.
+        record: whether anything is logged.
+        path: see `run`.
+
+    Raises:
+        InputError: a model, a part or a number of the scenario cannot be used.
+    """
+
+    def __init__(
+        self,
+        scenario: Scenario,
+        seed: int,
+        trial: int = 0,
+        *,
+        world: Any = None,
+        navigators: Mapping[str, Navigator] | None = None,
+        missions: Mapping[str, Mission] | None = None,
+        agents: Callable[..., Any] = Agent,
+        record: bool = True,
+        path: str | os.PathLike[str] | None = None,
+    ) -> None:
+        self.scenario, rates = scenario, scenario.rates
+
+        def noise(vehicle: str) -> Callable[[str], Generator]:
+            return lambda source: stream(seed, trial, f"{vehicle}/{source}")
+
+        self.world = world or build_world(scenario, current(scenario, seed, trial))
+        self._places = {
+            name: Place(name=name, pose=settings.pose, structure=_structure(self.world, name, settings.model))
+            for name, settings in scenario.structures.items()
+        }
+        self.agents = [
+            agents(
+                name, scenario, _vehicle(self.world, name, settings.model), self._places, noise(name),
+                navigator=(navigators or {}).get(name), mission=(missions or {}).get(name),
+            )
+            for name, settings in scenario.vehicles.items()
+        ]  # fmt: skip
+        self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.dock]
+        links = {
+            usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
+        }
+        self.network = Network(links, self._usbl)
+        self._physics_ticks = round(rates.physics / rates.control)
+        self._log_ticks = max(1, round(rates.control / rates.log))
+        self.progress_ticks = round(6.0 * rates.control)
+        self._listeners = listeners(self.world.current)
+        self.ticks = 0
+        self.truths: dict[str, Truth] = {}
+        for name, settings in scenario.vehicles.items():
+            start = settings.start
+            place = np.array(scenario.start_position(name))
+            self.place(name, place, math.radians(start.heading_deg), start.speed)
+        self.log = self._recorder(seed, trial, path) if record else Unrecorded()
+        self._record_models()
+        self._record_truths()
+
+    @property
+    def time(self) -> float:
+        """Simulated time of the last truths [s]."""
+        return next(iter(self.truths.values())).time
+
+    @property
+    def over(self) -> bool:
+        """Whether every vehicle has come to the end of its mission."""
+        return all(agent.over for agent in self.agents)
+
+    def place(self, name: str, position: Array, heading: float, speed: float) -> None:
+        """Puts a vehicle at another start, before the first step; its actuators already do what is demanded.
+
+        Args:
+            name: of the vehicle.
+            position: (3,) NED [m].
+            heading: [rad].
+            speed: through the water [m/s].
+        """
+        agent = next(agent for agent in self.agents if agent.name == name)
+        channels = agent.vehicle.actuation.allocate(agent.commands)
+        self.world.place(name, position, heading, speed, channels)
+        self.truths[name] = self.world.truth(name)
+
+    def step(self) -> None:
+        """One control period: physics, sensors, network, estimators, missions, control.
+
+        Raises:
+            DivergenceError: the simulation left the range of physical states.
+        """
+        world, log = self.world, self.log
+        world.advance(self._physics_ticks)
+        self.ticks += 1
+        before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
+        time = world.time
+        for agent in self.agents:
+            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
+        for ping, fate in self.network.poll(before, self.truths):
+            log.reading(
+                fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
+            )
+            m = fate.message
+            log.append(
+                "network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
+            )
+        for agent in self.agents:
+            agent.receive(self.network.deliver(agent.name, time))
+            with_blame(agent, agent.navigate, self.ticks, time, log)
+        for agent in self.agents:
+            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
+            if demand is not None:
+                self._report_approach(agent)
+                world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+        if self.ticks % self._log_ticks == 0:
+            self._record_truths()
+
+    def progress(self) -> ProgressState:
+        """Progress of the run."""
+        phases = [(agent.name, agent.mission.phases[agent.mission.phase]) for agent in self.agents]
+        text = phases[0][1] if len(phases) == 1 else ", ".join(f"{name} {phase}" for name, phase in phases)
+        first = self.agents[0]
+        distance = math.nan
+        if first.dock:
+            distance = math.dist(self.truths[first.name].position, self.scenario.structures[first.dock].pose.position)
+        return ProgressState(self.time, self.scenario.duration, text, distance)
+
+    def log_contacts(self) -> None:
+        """Logs the contacts of every vehicle, and their impulse so far."""
+        for agent in self.agents:
+            impulse, tick = 0.0, 1.0 / self.scenario.rates.physics
+            for contact in self.world.contacts(agent.name):
+                impulse += contact.force * tick
+                self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
+
+    def _record_models(self) -> None:
+        """Writes down the text of every model, since its file may change or be elsewhere when the log is read."""
+        texts = {("vehicle", self.scenario.vehicles[a.name].model): a.vehicle.source for a in self.agents}
+        for name, place in self._places.items():
+            texts["structure", self.scenario.structures[name].model] = place.structure.source
+        for (kind, model), text in texts.items():
+            self.log.append("models", (0.0, kind, model, hashlib.sha256(text.encode()).hexdigest(), text))
+
+    def _record_truths(self) -> None:
+        for name, truth in self.truths.items():
+            self.log.truth(name, truth)
+
+    def _report_approach(self, agent: Agent) -> None:
+        """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
+        if not self._listeners or agent.mission is None:
+            return
+        attempt, dock = agent.approach, agent.mission.dock
+        if attempt is not None and dock is not None and agent is self.agents[0]:
+            away = self.truths[agent.name].position[:2] - dock.pose.position[:2]
+            for listener in self._listeners:
+                listener.approach(attempt, float(np.hypot(*away)), self.time)
+
+    def _service(self, agent: Agent, noise: Callable[[str], Generator]) -> Usbl:
+        """The USBL of the dock that serves a vehicle."""
+        assert agent.dock is not None
+        settings = self.scenario.vehicles[agent.name].sensors.usbl
+        state = self.world.structures.get(agent.dock)
+        return Usbl(
+            settings,
+            noise("usbl"),
+            self.scenario.structures[agent.dock].pose,
+            vehicle=agent.name,
+            structure=agent.dock,
+            clock_offset=self.scenario.network.acoustics.clock_offset,
+            occupant=lambda: state.latched if state else None,
+        )
+
+    def _recorder(self, seed: int, trial: int, path: str | os.PathLike[str] | None) -> Recorder:
+        scenario = self.scenario
+        served = {usbl.vehicle: ({"value": usbl.value, **usbl.columns}, usbl.sizes) for usbl in self._usbl}
+        groups = run_groups({agent.name: agent.groups(served.get(agent.name)) for agent in self.agents})
+        attributes: dict[str, Any] = {"scenario": to_yaml(scenario), "seed": seed, "trial": trial}
+        if scenario.datum.latitude is not None and scenario.datum.longitude is not None:
+            attributes |= {"latitude": scenario.datum.latitude, "longitude": scenario.datum.longitude}
+        of_groups = {f"vehicles/{agent.name}": self._attributes_of(agent) for agent in self.agents}
+        of_groups |= {f"structures/{name}": self._attributes_of_structure(name) for name in scenario.structures}
+        return Recorder(groups, attributes, of_groups, path)
+
+    def _attributes_of(self, agent: Agent) -> dict[str, Any]:
+        """Attributes of a vehicle in the log."""
+        settings = self.scenario.vehicles[agent.name]
+        return {
+            "model": settings.model,
+            "nose": agent.vehicle.nose,
+            "length": agent.vehicle.length,
+            "estimator": settings.estimator.kind,
+            "controller": settings.control.kind,
+            "mission": settings.mission.kind,
+            "mission_settings": yaml_text.dump(settings.mission.model_dump(mode="json")),
+            "dock": agent.mission.dock.name if agent.mission.dock else "",
+            "usbl_structure": agent.dock or "",
+        }
+
+    def _attributes_of_structure(self, name: str) -> dict[str, Any]:
+        """Attributes of a structure in the log; its transceiver is that of the first vehicle that it serves."""
+        settings = self.scenario.structures[name]
+        place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
+        served = next((agent.name for agent in self.agents if agent.dock == name), None)
+        transceiver = self.scenario.vehicles[served].sensors.usbl.transceiver if served else ()
+        axes = ("transceiver_forward", "transceiver_starboard", "transceiver_down")
+        return {
+            "model": settings.model,
+            **place,
+            "heading": settings.pose.heading,
+            **self._places[name].structure.dimensions,
+            **dict(zip(axes, transceiver, strict=False)),
+        }
+
+
+class Unrecorded:
+    """Takes the place of a recorder where nothing is to be kept."""
+
+    def append(self, group: str, row: Sequence[Any]) -> None:
+        """Keeps nothing."""
+
+    def truth(self, vehicle: str, truth: Truth) -> None:
+        """Keeps nothing."""
+
+    def reading(self, vehicle: str, reading: Reading, *extra: Any) -> None:
+        """Keeps nothing."""
+
+    def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
+        """Keeps nothing."""
+
+
+def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
+    """One turn of an agent; what a part of a user's own raises in it names that part.
+
+    Raises:
+        PartError: a part of a user's own raised something.
+    """
+    try:
+        return turn(*arguments)
+    except (Exception, SystemExit) as error:
+        raise agent.blame(error) from error.__cause__
+
+
+def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
+    """The current of a run; its draws are from a stream of the only vehicle, or of the water."""
+    names = [*scenario.vehicles]
+    source = f"{names[0]}/current" if len(names) == 1 else "water/current"
+    return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
+
+
+def check_steps(scenario: Scenario) -> None:
+    """Sees that the physics step is short enough for every vehicle.
+
+    Raises:
+        InputError: it is too long; the text says which rate would do.
+    """
+    for model in {settings.model: None for settings in scenario.vehicles.values()}:
+        soundness.check_step(model, scenario.physics.integrator, scenario.rates.physics, scenario.water.density)
+
+
+def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> World:
+    """MuJoCo's world of a scenario.
+
+    Args:
+        scenario: what is in it.
+        current: what the water does.
+        **given: see `World`.
+    """
+    scene = scenes.scene(
+        {name: settings.model for name, settings in scenario.vehicles.items()},
+        {name: (settings.model, settings.pose) for name, settings in scenario.structures.items()},
+        scenario.world,
+        scenario.rates.physics,
+    )
+    return World(scene, current, scenario.water.density, **given)
+
+
+def _vehicle(world: Any, name: str, model: str) -> library.Vehicle:
+    """The model of a vehicle, which the world has loaded already, or else is loaded."""
+    known = getattr(world, "models", {})
+    return known[name] if name in known else library.vehicle(model)
+
+
+def _structure(world: Any, name: str, model: str) -> library.Structure:
+    """The model of a structure, likewise."""
+    return world.structures[name].structure if name in world.structures else library.structure(model)

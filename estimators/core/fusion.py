@@ -1,0 +1,46 @@
+"""Fusion of beliefs whose correlation is unknown: covariance intersection (Julier and Uhlmann 1997)."""
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from estimators.core.bounds import inverse
+from estimators.core.types import Array, Gaussian, wrapped
+
+
+def intersect(
+    a: Gaussian, b: Gaussian, angles: tuple[int, ...] = (), weight: float | None = None
+) -> tuple[Gaussian, float]:
+    """A belief that is consistent whatever the correlation of two beliefs of one state, and the weight of the first.
+
+    P^-1 = w A^-1 + (1 - w) B^-1; the weight is that of the least determinant unless it is given.
+
+    Raises:
+        NotPositiveDefiniteError: A covariance is not positive definite.
+    """
+    A, B = inverse(a.covariance), inverse(b.covariance)
+
+    def log_volume(w: float) -> float:
+        return -float(np.linalg.slogdet(w * A + (1.0 - w) * B)[1])
+
+    if weight is None:
+        found = float(minimize_scalar(log_volume, bounds=(0.0, 1.0), method="bounded").x)
+        weight = min((0.0, found, 1.0), key=log_volume)
+    return _weighed(a, b, weight * A, (1.0 - weight) * B, angles), weight
+
+
+def intersect_partial(belief: Gaussian, H: Array, value: Array, covariance: Array, weight: float) -> Gaussian:
+    """The belief after a measurement H x of which it is unknown how correlated it is with the belief.
+
+    As of another vehicle that has used one's own position before: P / w and R / (1 - w) are fused as if independent.
+    """
+    P, R = belief.covariance / weight, covariance / (1.0 - weight)
+    K = np.linalg.solve(H @ P @ H.T + R, H @ P).T
+    mean = belief.mean + K @ (value - H @ belief.mean)
+    L = np.eye(belief.mean.size) - K @ H
+    return Gaussian(mean=mean, covariance=L @ P @ L.T + K @ R @ K.T)
+
+
+def _weighed(a: Gaussian, b: Gaussian, A: Array, B: Array, angles: tuple[int, ...]) -> Gaussian:
+    P = inverse(A + B)
+    change = P @ B @ wrapped(b.mean - a.mean, angles)
+    return Gaussian(mean=wrapped(a.mean + change, angles), covariance=P)

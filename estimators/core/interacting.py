@@ -1,0 +1,205 @@
+"""Interacting Kalman filters of any process and any sensors, whose measurements may be outliers, for a `History`."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.core import ekf, imm, loops, outliers
+from estimators.core.consistency import chi_square
+from estimators.core.ekf import Innovation
+from estimators.core.errors import ParameterError
+from estimators.core.filter import OUTLIER, Start, of_source, without
+from estimators.core.history import Input, Node
+from estimators.core.outliers import MixtureUpdate, Outliers
+from estimators.core.recovery import PROBABLE, REMEMBERED, Recovery, Rejected
+from estimators.core.types import (
+    NO_MODEL,
+    Array,
+    Gaussian,
+    Measurement,
+    MeasurementModel,
+    Models,
+    ProcessModel,
+    Verdicts,
+    model_of,
+)
+
+SHORTEST = 0.1  # time between measurements that counts at least, so that no mode ever dies out [s]
+MIN_ACCEPTED = 3  # measurements accepted before two that agree with each other no longer suffice to correct the filter
+
+
+class InteractingState(NamedTuple):
+    """What a node keeps: each mode's belief and probability, and what is remembered of measurements."""
+
+    beliefs: tuple[Gaussian, ...]
+    weights: Array  # (m,) probabilities of the modes
+    last_fix: float  # stamp of the last measurement that weighed the modes [s]
+    accepted: int = 1  # such measurements taken so far
+    outliers: int = 0  # those more probably wrong than not, so far
+    rejected: tuple[Rejected, ...] = ()
+    innovation: Innovation | None = None  # of the last of them, in the mode most probable then
+    verdicts: Verdicts = ()  # on this node's measurements, and revised ones
+    angles: tuple[int, ...] = (2,)  # states that are angles
+
+    @property
+    def belief(self) -> Gaussian:
+        """The modes' beliefs merged."""
+        return imm.merge(self.beliefs, self.weights, self.angles)
+
+
+class InteractingModelFilter:
+    """Interacting extended Kalman filters that differ in their process (Blom and Bar-Shalom 1988).
+
+    Measurements of the kinds in `mixtures` are weighed against being outliers in each mode, and weigh the modes. Modes
+    change at constant rates, however often measurements come: right after one, by what the time since the one before
+    it allows. Other kinds say nothing of the modes and are fused in each.
+
+    A filter that takes good measurements for outliers, because it is wrong itself, is set right by measurements that
+    agree against it: by two if it has taken fewer than three, as after a wrong first one, else by three.
+
+    Args:
+        processes: One of each mode; all have the same states.
+        sensors: What each kind, or (kind, source), of measurement shows.
+        start: See `filter.ModelFilter`.
+        switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
+        initial: Probabilities of the modes at first (m,).
+        mixtures: Model of outliers, by kind.
+        recovery: What to do about measurements that are rejected again and again.
+        blended: The process that stands for all modes of given probabilities, for smoothing; None: the most probable's.
+
+    Raises:
+        ParameterError: Rates or probabilities do not fit the modes.
+    """
+
+    def __init__(
+        self,
+        processes: Sequence[ProcessModel],
+        sensors: Models,
+        start: Start,
+        *,
+        switching: Sequence[Sequence[float]],
+        initial: Sequence[float],
+        mixtures: Mapping[str, Outliers],
+        recovery: Recovery,
+        blended: Callable[[Array], ProcessModel] | None = None,
+    ) -> None:
+        self._processes, self.sensors, self._start = tuple(processes), sensors, start
+        self._initial = np.array(initial, dtype=float)
+        self._generator = generator(np.array(switching, dtype=float), len(processes))
+        shaped = self._initial.shape == (len(processes),) and (self._initial > 0.0).all()
+        if not (shaped and abs(self._initial.sum() - 1.0) < 1e-9):
+            raise ParameterError(f"initial {list(initial)} must be {len(processes)} probabilities above 0 of sum 1")
+        self._mixtures, self._recovery, self._blended = dict(mixtures), recovery, blended
+        self._angles = self._processes[0].angles
+
+    def start(self, nodes: Sequence[Node[InteractingState]], index: int) -> InteractingState | None:
+        """State at the first node that suffices; its other measurements are fused."""
+        first = self._start(nodes, index)
+        if first is None:
+            return None
+        belief, used = first
+        known = {id(m) for m in used}
+        last = max((m.stamp for m in used if m.kind in self._mixtures), default=nodes[index].time)
+        verdicts = tuple((m, "", math.nan) for m in used)
+        beliefs = (belief,) * len(self._processes)
+        state = InteractingState(beliefs, self._initial, last, verdicts=verdicts, angles=self._angles)
+        others = [m for m in nodes[index].measurements if id(m) not in known]
+        return self.correct(state, nodes[index].time, others)
+
+    def predict(self, state: InteractingState, u: Input, duration: float) -> InteractingState:
+        """State after `duration` [s]."""
+        modes = zip(state.beliefs, self._processes, strict=True)
+        beliefs = tuple(ekf.predict(belief, process, u, duration) for belief, process in modes)
+        return state._replace(beliefs=beliefs, verdicts=())
+
+    def correct(
+        self, state: InteractingState, node_time: float, measurements: Sequence[Measurement]
+    ) -> InteractingState:
+        """State after a node's measurements."""
+        for measurement in measurements:
+            model = model_of(self.sensors, measurement)
+            if model is None:
+                state = state._replace(verdicts=(*state.verdicts, (measurement, NO_MODEL, math.nan)))
+            elif measurement.kind in self._mixtures:
+                state = self._weighed(state, measurement, model)
+            else:
+                fused = [ekf.fuse(belief, measurement, model) for belief in state.beliefs]
+                verdict = (measurement, "", fused[int(state.weights.argmax())][1])
+                beliefs = tuple(belief for belief, _ in fused)
+                state = state._replace(beliefs=beliefs, verdicts=(*state.verdicts, verdict))
+        return state
+
+    def process_after(self, state: InteractingState) -> ProcessModel:
+        """For `smoothing`: the merged belief moves on by the process that stands for all modes."""
+        if self._blended is not None:
+            return self._blended(state.weights)
+        return self._processes[int(state.weights.argmax())]
+
+    def _weighed(self, state: InteractingState, fix: Measurement, model: MeasurementModel) -> InteractingState:
+        mixture = self._mixtures[fix.kind]
+        modes = [outliers.correct(belief, fix, model, mixture) for belief in state.beliefs]
+        weights = imm.update(state.weights, [mode.log_likelihood for mode in modes])
+        innovation = modes[int(weights.argmax())].innovation
+        own = of_source(state.rejected, fix)
+        rejected = without(state.rejected, own)
+        count = state.outliers
+        is_wrong = bool(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5)
+        # One that the filter would take, but only just, may as well confirm one that it did not take.
+        if is_wrong or (own and innovation.nis > chi_square(PROBABLE, innovation.residual.size)):
+            now = _rejected(state, fix, model, modes, innovation)
+            agreeing = self._recovery.agreeing(now, own)
+            enough = self._recovery.suffice(now, own, agreeing, state.accepted >= MIN_ACCEPTED)
+            if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED):
+                earlier = agreeing[0] if agreeing else own[-1]
+                beliefs = (self._recovery.recover(state.belief, earlier, now, model),) * len(modes)
+                verdicts = (*state.verdicts, (fix, "", innovation.nis))
+                if self._recovery.fuses_both:
+                    verdicts += tuple(found.taken for found in agreeing or (earlier,))
+                    count -= len(agreeing)
+                return InteractingState(
+                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles
+                )
+            if is_wrong:
+                rejected = (
+                    (*rejected, *own[1 - REMEMBERED :], now) if len(own) >= REMEMBERED else (*state.rejected, now)
+                )
+            count += is_wrong
+        accepted = state.accepted + (not is_wrong)
+        transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
+        beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, self._angles)
+        verdicts = (*state.verdicts, (fix, OUTLIER if is_wrong else "", innovation.nis))
+        return InteractingState(
+            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles
+        )
+
+
+def _rejected(
+    state: InteractingState,
+    fix: Measurement,
+    model: MeasurementModel,
+    modes: Sequence[MixtureUpdate],
+    innovation: Innovation,
+) -> Rejected:
+    """A measurement as seen by the modes together, before it was used."""
+    residual = np.sum([w * m.innovation.residual for w, m in zip(state.weights, modes, strict=True)], axis=0)
+    return Rejected(fix, residual, model.jacobian(state.belief.mean, fix), innovation.nis, innovation)
+
+
+def generator(rates: Array, modes: int) -> Array:
+    """Rates of a Markov chain (m, m) with the diagonal that makes its rows sum to zero.
+
+    Raises:
+        ParameterError: They are not rates between that many modes, or leave a mode that is never reached.
+    """
+    Q = rates.copy() if rates.shape == (modes, modes) else np.full((modes, modes), -1.0)
+    np.fill_diagonal(Q, 0.0)
+    # Every mode leads to every other, at once or by way of others.
+    if (Q < 0.0).any() or not (np.linalg.matrix_power(np.eye(modes) + (Q > 0.0), modes) > 0.0).all():
+        raise ParameterError(
+            f"{modes} modes need a row and a column of switching rates each, none below 0, that lead from every mode "
+            f"to every other; not {rates.tolist()}"
+        )
+    np.fill_diagonal(Q, -Q.sum(axis=1))
+    return Q

@@ -1,0 +1,1 @@
+"""Process models and sensors of any vehicle, by composition."""

@@ -1,0 +1,67 @@
+"""One gate for every scalar sensor: values no filter should see are refused by name, before any model sees them."""
+
+import math
+from dataclasses import dataclass
+
+from estimators.core.errors import ParameterError
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Limits:
+    """What a healthy sensor can show."""
+
+    low: float = -math.inf  # values outside are impossible
+    high: float = math.inf
+    rate: float = math.inf  # fastest change [unit/s]; what jumps faster is a spike
+    noise: float = 0.0  # change beyond that rate that its noise explains [unit]
+    frozen: float = math.inf  # time in which a live sensor changes at least once [s]
+    period: float | None = None  # of an angle, 2 pi, so that a turn is no jump
+
+    def __post_init__(self) -> None:
+        if not (self.low < self.high and self.rate > 0.0 and self.noise >= 0.0 and self.frozen > 0.0):
+            raise ParameterError(f"limits {self} must have low < high, and rate and frozen above 0")
+
+
+class Screen:
+    """Judges the values of one scalar sensor, in order of arrival.
+
+    Reasons: "not_finite"; "impossible", outside its limits; "clock", a stamp that is no later than the one before;
+    "spike", farther from the last good value than the sensor's rate allows in the time since; "frozen", the same value
+    for longer than a live sensor keeps it. What a spike is compared with is given up after two values in a row that
+    agree with each other: then it was the last good one that was wrong, or the vehicle was moved.
+    """
+
+    def __init__(self, limits: Limits) -> None:
+        self.limits = limits
+        self._stamp, self._value = -math.inf, math.nan  # the last good one
+        self._doubtful: tuple[float, float] | None = None  # the last spike
+        self._changed = -math.inf  # since when the sensor has shown `_shown`
+        self._shown = math.nan
+        self._latest = -math.inf  # stamp
+
+    def judge(self, stamp: float, value: float) -> str:
+        """The reason to refuse a value that was true at `stamp` [s]; "" if there is none."""
+        limits = self.limits
+        if not (math.isfinite(value) and math.isfinite(stamp)):
+            return "not_finite"
+        if not limits.low <= value <= limits.high:
+            return "impossible"
+        if stamp <= self._latest:
+            return "clock"
+        self._latest = stamp
+        if value != self._shown:
+            self._shown, self._changed = value, stamp
+        elif stamp - self._changed > limits.frozen:
+            return "frozen"
+        if self._jumps(stamp, value, self._stamp, self._value):
+            doubtful, self._doubtful = self._doubtful, (stamp, value)
+            if doubtful is None or self._jumps(stamp, value, *doubtful):
+                return "spike"
+        self._stamp, self._value, self._doubtful = stamp, value, None
+        return ""
+
+    def _jumps(self, stamp: float, value: float, before: float, last: float) -> bool:
+        change = value - last
+        if self.limits.period is not None:
+            change = math.remainder(change, self.limits.period)
+        return abs(change) > self.limits.noise + self.limits.rate * (stamp - before)  # False of the first: NaN

@@ -1,0 +1,24 @@
+"""A world as sensors see it, without physics."""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from auvsim.physics.truth import Truth
+from auvsim.water.currents import CurrentField, Uniform
+
+
+@dataclass(frozen=True)
+class Around:
+    """Still water over a flat floor, with nothing in it, if not said otherwise."""
+
+    current: CurrentField = field(default_factory=lambda: Uniform((0.0, 0.0, 0.0)))
+    floor: float = 40.0
+    structures: dict[str, Any] = field(default_factory=dict)
+    vehicles: dict[str, Truth] = field(default_factory=dict)
+
+    def truth(self, vehicle: str) -> Truth:
+        """The state of another vehicle."""
+        return self.vehicles[vehicle]
+
+
+WATER = Around()
