@@ -40,7 +40,7 @@ class Rollouts:
 
     @property
     def shares(self) -> Array:
-        """Position errors relative to the distance run (s, m); 10 where the model ran away, NaN past the motion's end."""
+        """Position errors relative to the distance run (s, m): 10 where it ran away, NaN past the motion's end."""
         off = np.hypot(self.errors[..., 0], self.errors[..., 1]) / np.maximum(self.distance, 1e-6)
         return np.where(np.isfinite(self.distance), np.where(np.isfinite(off), np.minimum(off, 10.0), 10.0), np.nan)
 
