@@ -73,12 +73,12 @@ def run(
                 named = "vehicle" if vehicle is None else _stem(vehicle)
                 given = {"name": named, "hull": known, "quick": quick, "progress": progress}
                 motion = _motion(readings, judging, given, alone=planar is None)
-        if motion is not None:
-            written += _write_motion(motion, out, alone=planar is None)
-            show_motion(motion)
         if planar is not None:
             written += _write(planar, out, target)
             show(planar)
+        if motion is not None:
+            written += _write_motion(motion, out, alone=planar is None)
+            show_motion(motion, planar)
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
 
@@ -173,27 +173,51 @@ def _write(found: Identification, out: Path, target: Path | None) -> list[Path]:
     return files + written
 
 
-def show_motion(found: MotionIdentification) -> None:
-    """Prints how far to trust the motion model, what the data say, and the tables of horizons and candidates."""
+def show_motion(found: MotionIdentification, planar: Identification | None = None) -> None:
+    """Prints how far to trust the motion model, what the data say, and the tables of horizons and candidates.
+
+    Beside a vehicle's planar model, whose notes are printed already, it says whose predictions are better.
+    """
     console = Console(markup=False, highlight=False)
-    for good, text in verdicts(found):
+    if planar is not None:
+        console.print(f"\nmotion model of {found.name}, its structure chosen from the data alone", soft_wrap=True)
+    beside = None if planar is None else compared(planar, found)
+    for good, text in verdicts(found) if beside is None else [beside, *verdicts(found)]:
         console.print(f"{'+' if good else '!'} {text}", soft_wrap=True)
-    _notes(console, found.readings.notes)
+    if planar is None:
+        _notes(console, found.readings.notes)
     horizons = Table(title="open loop", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
     for heading in ("after [s]", "of", "error [%]", "going on [%]", "95 % band [%]", "holds [%]", "coefficients' [%]"):
         horizons.add_column(heading, justify="right")
     for row in motion_page.horizon_rows(found):
         horizons.add_row(*row)
     console.print(horizons)
-    compared = Table(title=f"cross-validation, {found.choice.horizon:.0f} s", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    candidates = Table(
+        title=f"cross-validation, {found.choice.horizon:.0f} s", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
+    )
     for heading in ("structure", "step", "error [%]", "standard error", ""):
-        compared.add_column(heading)
+        candidates.add_column(heading)
     for c in found.choice.candidates:
         mark = "chosen" if c is found.choice.chosen else "" if c.converged else "not converged"
-        compared.add_row(c.structure.name, c.step, f"{100 * c.error:.2f}", f"{100 * c.deviation:.2f}", mark)
-    console.print(compared)
+        candidates.add_row(c.structure.name, c.step, f"{100 * c.error:.2f}", f"{100 * c.deviation:.2f}", mark)
+    console.print(candidates)
     if not found.better:
         console.print(f"! no {files.NAME} written: going on as it began predicts as well", soft_wrap=True)
+
+
+def compared(planar: Identification, motion: MotionIdentification) -> tuple[bool, str] | None:
+    """Whether the motion model predicts what was held out better than the planar one; None without a common horizon."""
+    seconds = {judged.seconds for judged in planar.judged}
+    if motion.holdout is None or len(seconds) > 1 or not seconds <= set(motion.holdout.horizons):
+        return None
+    at = seconds.pop()
+    error = float(motion.holdout.share[motion.holdout.horizons.index(at)])
+    better = error < planar.share
+    first, low, high = ("motion", error, planar.share) if better else ("planar", planar.share, error)
+    text = (
+        f"the {first} model predicts what was held out better: off by {low:.2%} against {high:.2%} of the distance run"
+    )
+    return better, f"{text} after {at:.0f} s"
 
 
 def _notes(console: Console, notes: Sequence[str]) -> None:

@@ -3,6 +3,8 @@
 import math
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import baselines
 import numpy as np
@@ -12,11 +14,14 @@ import tanker
 
 from auvsim import cli
 from auvsim.base.errors import InputError
+from auvsim.cli import identify as command
 from auvsim.identification.motion import data, files, fit, lags
+from auvsim.identification.motion import report as motion_report
 from auvsim.identification.motion.choice import Candidate, choose, seen, simplest
 from auvsim.identification.motion.dimensions import Dimensions, coefficients
 from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
 from auvsim.identification.motion.rollout import persistence, roll
+from auvsim.identification.pipeline import Identification
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
 from auvsim.physics import planar_sets
@@ -376,6 +381,35 @@ def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, caps
     parameters = planar_sets.read(tmp_path / "o" / "parameters.yaml").planar()
     process = PlanarProcess(parameters, np.zeros(8))
     assert np.isfinite(process.evaluate(np.array([0, 0, 0, 1.0, 0, 0, 0, 0]), (0.1, 60.0), 60.0)).all()
+
+
+def test_the_page_shows_names_as_text(found: MotionIdentification) -> None:
+    """Names of users' files and vehicles are text, never markup."""
+    source = planar_sets.Source(file="a<b>.csv", sha256="0" * 64)
+    readings = replace(found.readings, sources=(source,), notes=("x<i>y",))
+    page = motion_report.html(replace(found, name="S&<u>", readings=readings))
+    for shown, markup in (("a&lt;b&gt;.csv", "<b>"), ("x&lt;i&gt;y", "<i>"), ("S&amp;&lt;u&gt;", "<u>")):
+        assert shown in page
+        assert markup not in page
+    assert "<svg" in page
+
+
+def test_of_two_models_the_better_is_said(found: MotionIdentification) -> None:
+    """The planar model and the motion model by their errors on what was held out, at the horizon of both."""
+    judged = found.left_out
+    at = judged.horizons[-1]
+    motion = replace(found, holdout=judged)
+    error = float(judged.share[-1])
+    for factor, better in ((0.5, False), (2.0, True)):
+        planar = SimpleNamespace(judged=[SimpleNamespace(seconds=at)], share=factor * error)
+        said = command.compared(cast(Identification, planar), motion)
+        assert said is not None
+        assert said[0] == better
+        assert f"{'motion' if better else 'planar'} model predicts what was held out better" in said[1]
+        assert f"{min(1.0, factor) * error:.2%} against {max(1.0, factor) * error:.2%}" in said[1]
+        assert command.compared(cast(Identification, planar), replace(motion, holdout=None)) is None
+    other = SimpleNamespace(judged=[SimpleNamespace(seconds=at + 1.0)], share=error)
+    assert command.compared(cast(Identification, other), motion) is None
 
 
 def test_a_hull_says_what_its_dimensions_say() -> None:
