@@ -249,6 +249,21 @@ def test_the_step_that_predicts_best_is_kept() -> None:
     assert pipeline._kept(runs, TRUE, [good, replace(good, method="prediction error")]) == (-1, [])
 
 
+def test_an_unmeasured_speed_is_that_of_the_shaft() -> None:
+    """A log without speeds: the vehicle's steady speed at its mean shaft speed, within a tenth; at most its fastest."""
+    true = record("zigzag", 3, 60.0)
+    blind = true.measured.copy()
+    blind[:, [3, 4, 6, 7]] = np.nan
+    silent = replace(true, measured=blind)
+    assert pipeline._speed([silent], "remus100") == pytest.approx(pipeline._speed([true], "remus100"), rel=0.1)
+    limit = library.vehicle("remus100").actuation.shaft_limit
+    at, beyond = (
+        replace(silent, inputs=np.column_stack([true.inputs[:, 0], np.full(len(true.times), shaft)]))
+        for shaft in (limit, 2.0 * limit)
+    )
+    assert pipeline._speed([beyond], "remus100") == pipeline._speed([at], "remus100")
+
+
 @pytest.mark.slow
 def test_prediction_errors_polish_the_fit() -> None:
     """Whole, with noise of the process: good on the hold-out, and the noise is found within a factor of 3."""
