@@ -249,6 +249,14 @@ def test_the_step_that_predicts_best_is_kept() -> None:
     assert pipeline._kept(runs, TRUE, [good, replace(good, method="prediction error")]) == (-1, [])
 
 
+def test_the_kept_fit_is_the_result(found: Identification) -> None:
+    """The last fit unless another one is named."""
+    last = replace(found.fit, method="last")
+    both = replace(found, fits=(found.fit, last))
+    assert both.fit is last
+    assert replace(both, kept=0).fit is found.fit
+
+
 def test_an_unmeasured_speed_is_that_of_the_shaft() -> None:
     """A log without speeds: the vehicle's steady speed at its mean shaft speed, within a tenth; at most its fastest."""
     true = record("zigzag", 3, 60.0)
