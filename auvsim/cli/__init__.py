@@ -185,11 +185,13 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fits the planar model's parameters to logs of manoeuvres and judges them on one that is held out.
+    """Fits the model of motion that predicts best to logs of manoeuvres, and judges it on what is held out.
 
-    Writes report.html, report.png and, if they predict better than those it started from, parameters.yaml, which
-    --estimator.model of `auvsim dock` takes. A log is a trial's, or a CSV or NetCDF file with named columns such as
-    `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading clockwise from north.
+    Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model
+    of `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle)
+    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with
+    named columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
+    clockwise from north.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LOG...")]
@@ -200,12 +202,22 @@ class Identify:
     """Logs to judge by; by default the least informative kind of manoeuvre."""
     columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
     """Meaning of columns, where their names do not say it: `rudder: {column: d, unit: deg, sign: -1}`."""
-    vehicle: str = "remus100"
-    """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit starts."""
+    vehicle: str | None = None
+    """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit of the planar model starts."""
+    length: float | None = None
+    """Length of the hull [m]; with beam, draught and mass it says what is known of the motion before the logs."""
+    beam: float | None = None
+    """Beam of the hull [m]."""
+    draught: float | None = None
+    """Draught of the hull, of a submerged body half its height [m]."""
+    mass: float | None = None
+    """Mass of the vehicle [kg]."""
+    quick: bool = False
+    """Fewer structures and steps on a coarser grid: some seconds."""
     name: str | None = None
     """Also keep the parameters under this name, in models/<vehicle>/planar/."""
     steps: tuple[str, ...] = ()
-    """Some of least-squares, segments, prediction-error; by default all."""
+    """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -356,7 +368,8 @@ def _run(arguments: list[str]) -> int:
 
         return identify.run(
             command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
-            vehicle=command.vehicle, name=command.name, steps=command.steps,
+            vehicle=command.vehicle, name=command.name, steps=command.steps, quick=command.quick,
+            hull=(command.length, command.beam, command.draught, command.mass),
         )  # fmt: skip
 
     if isinstance(command, Reproduce):
