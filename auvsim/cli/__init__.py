@@ -216,6 +216,8 @@ class Identify:
     """Fewer structures and steps on a coarser grid: some seconds."""
     name: str | None = None
     """Also keep the parameters under this name, in models/<vehicle>/planar/."""
+    motion: bool = False
+    """Also choose a motion model of a known vehicle, which then takes longer; for an unknown one it always does."""
     steps: tuple[str, ...] = ()
     """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
 
@@ -369,7 +371,7 @@ def _run(arguments: list[str]) -> int:
         return identify.run(
             command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
             vehicle=command.vehicle, name=command.name, steps=command.steps, quick=command.quick,
-            hull=(command.length, command.beam, command.draught, command.mass),
+            hull=(command.length, command.beam, command.draught, command.mass), motion=command.motion,
         )  # fmt: skip
 
     if isinstance(command, Reproduce):

@@ -39,11 +39,12 @@ def run(
     steps: Sequence[str] = (),
     quick: bool = False,
     hull: Sequence[float | None] = (None,) * 4,
+    motion: bool = False,
 ) -> int:
     """Identifies, fills the folder, prints what was found and returns the exit code.
 
-    With a vehicle, that of the trial logs if none is given, its planar model is fitted from its masses; a motion model
-    of any structure in either case, but where --steps asks for the planar model alone.
+    With a vehicle, that of the trial logs if none is given, its planar model is fitted from its masses; without one, or
+    with `motion`, a motion model whose structure the data choose.
 
     Raises:
         InputError: What is wrong in a log or an argument, in one line; then nothing is written.
@@ -59,26 +60,27 @@ def run(
     chosen = _steps(steps)
     readings = read(logs, vehicle=vehicle, columns=columns)
     judging = read(holdout, vehicle=vehicle, columns=columns) if holdout else None
-    if not (engine.is_warm() and (vehicle is None or compiled.is_warm())):
+    warm = (vehicle is None or compiled.is_warm()) and (engine.is_warm() or not (vehicle is None or motion))
+    if not warm:
         print(COMPILING.format("identification"), file=sys.stderr)
     written: list[Path] = []
     with output_folder(out):
-        planar = motion = None
+        planar = chosen_motion = None
         with report.IdentificationProgress() as progress:
             if vehicle is not None:
                 planar = identify(
                     readings, judging, vehicle=_stem(vehicle), model=vehicle, steps=chosen, progress=progress
                 )
-            if not steps:
+            if vehicle is None or motion:
                 named = "vehicle" if vehicle is None else _stem(vehicle)
                 given = {"name": named, "hull": known, "quick": quick, "progress": progress}
-                motion = _motion(readings, judging, given, alone=planar is None)
+                chosen_motion = _motion(readings, judging, given, alone=planar is None)
         if planar is not None:
             written += _write(planar, out, target)
             show(planar)
-        if motion is not None:
-            written += _write_motion(motion, out, alone=planar is None)
-            show_motion(motion, planar)
+        if chosen_motion is not None:
+            written += _write_motion(chosen_motion, out, alone=planar is None)
+            show_motion(chosen_motion, planar)
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
 
