@@ -1,6 +1,7 @@
 """Parts of a user's own, named `package.module:Name` where the name of a shipped one could stand."""
 
 import importlib
+import re
 import sys
 from collections.abc import Mapping
 from pathlib import Path
@@ -12,6 +13,8 @@ from auvsim.base import schema
 from auvsim.base.errors import InputError, unknown_name
 
 Part = TypeVar("Part")
+
+ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")  # of an object in memory
 
 
 def is_own(name: str) -> bool:
@@ -70,3 +73,8 @@ def settings_of(part: Any, given: Mapping[str, Any], where: str) -> Any:
         raise schema.explain(error, of_its_own, given, {"": where}) from None
     except Exception as error:  # of pydantic, or whatever a class of the user's own raises
         raise InputError(f"{where}: {' '.join(str(error).split())[:300]}") from None
+
+
+def same_each_time(text: str) -> str:
+    """A text without addresses of objects in memory, which differ in every process."""
+    return ADDRESS.sub("0x...", text)

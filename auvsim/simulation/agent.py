@@ -196,7 +196,7 @@ class Agent:
         self._messages_to_filter += self._messages
         # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
         self._running = self._mission
-        if ticks % self._filter_ticks or self.mission.at_rest:
+        if self.mission.at_rest or ticks % self._filter_ticks:
             return
         self._running = self._estimator
         e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)

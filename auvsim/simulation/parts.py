@@ -47,8 +47,8 @@ class Part:
         """What to raise in place of an error that came out of this part."""
         if not self.own or not isinstance(error, Exception | SystemExit):
             return error
-        text = " ".join(str(error).split())[:300]
-        lines = "".join(traceback.format_exception(error)).strip()
+        text = plugins.same_each_time(" ".join(str(error).split()))[:300]
+        lines = plugins.same_each_time("".join(traceback.format_exception(error)).strip())
         return PartError(f"{self.name} failed: {type(error).__name__}: {text}", lines)
 
 
