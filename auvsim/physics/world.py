@@ -8,7 +8,7 @@ import numpy as np
 
 from auvsim.base.errors import DivergenceError, InputError
 from auvsim.base.frames import Array, flip
-from auvsim.physics import hydrodynamics
+from auvsim.physics import hydrodynamics, panels
 from auvsim.physics.contacts import Contact, ContactRecorder
 from auvsim.physics.craft import Craft
 from auvsim.physics.scenery import SEA_FLOOR
@@ -84,6 +84,9 @@ class World:
             name: Craft(model, self.data, name, vehicle, slots[f"{name}/"]) for name, vehicle in scene.vehicles.items()
         }
         self.vehicles = tuple(self._craft)
+        for name, structure in scene.structures.items():
+            if structure.panel_contact is not None and self.vehicles:
+                panels.soften(model, name, self.vehicles, *structure.panel_contact)
         self.models = scene.vehicles
         self._options, self._sensors = model.opt, self.data.sensordata
         active = self.data.eq_active
