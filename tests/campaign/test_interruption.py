@@ -23,7 +23,7 @@ def test_ctrl_c_is_one_line(engine: str, tmp_path: Path, capsys: pytest.CaptureF
     options = ["plan.yaml", "--out", "c", "--jobs", "1", "--engine", engine]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     command = subprocess.Popen(
-        [sys.executable, "-m", "auvsim.cli", "campaign", *options],
+        [sys.executable, "-m", "auvsim", "campaign", *options],
         cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         start_new_session=True,
     )  # fmt: skip

@@ -372,7 +372,7 @@ def test_help_answers_at_once() -> None:
 def test_broken_pipe_is_quiet() -> None:
     """`auvsim scenario --default | head -1` ends without a traceback."""
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
-    command = [sys.executable, "-m", "auvsim.cli", "scenario", "--default"]
+    command = [sys.executable, "-m", "auvsim", "scenario", "--default"]
     with subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdout is not None
         assert process.stderr is not None

@@ -1,7 +1,0 @@
-"""`python -m auvsim.cli`: the command without its installed script."""
-
-import sys
-
-from auvsim.cli import main
-
-sys.exit(main())
