@@ -31,7 +31,12 @@ def test_positions_are_those_of_the_origin(tmp_path: Path) -> None:
         packets.append([*(dock.T @ (there - DOCK) - TRANSCEIVER), *packet[3:]])
         places.append(place[:2])
     times, attitude = truth["time"], truth["attitude"]
-    compass = {"time": times, "received": times, "value": attitude[:, ::-1], "sequence": np.arange(len(times), dtype=np.int32)}
+    compass = {
+        "time": times,
+        "received": times,
+        "value": attitude[:, ::-1],
+        "sequence": np.arange(len(times), dtype=np.int32),
+    }
     at = "vehicles/remus100/sensors/"
     own = {at + "usbl": {**usbl, "value": np.array(packets)}, at + "compass": {**log["compass"], **compass}}
     groups = {**log.log.groups, **own}
