@@ -214,7 +214,7 @@ class Thrusters:
 
     @cached_property
     def _inverse(self) -> Array:
-        return np.linalg.pinv(self.matrix)
+        return np.asarray(np.linalg.pinv(self.matrix), dtype=np.float64)
 
     def at_speed(self, shaft_speed: float) -> Wrench:
         """No force: a thruster-driven vehicle has no shaft to hold a speed with."""
