@@ -15,7 +15,7 @@ class _Assumed(Settings):
         description="planar model: condense (fitted to MuJoCo's vehicle), a name in models/<vehicle>/planar/, a .yaml",
     )
     model_speed: float = Field(
-        default=1.0, gt=0, description="speed through the water at which the planar model is fitted [m/s]"
+        default=1.0, ge=0.05, le=20.0, description="speed through the water at which the planar model is fitted [m/s]"
     )
 
 

@@ -38,8 +38,10 @@ class WorldSettings(Settings):
         default="implicitfast",
         description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
     )
-    water_density: float = Field(default=hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
-    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
+    water_density: float = Field(
+        default=hydrodynamics.SEA_WATER, ge=900.0, le=1300.0, description="density of the water [kg/m3]"
+    )
+    sea_floor: float = Field(default=40.0, gt=0, le=12_000.0, description="depth of the sea floor [m]")
     terrain: TerrainSettings = Field(default=FlatSettings(), description="Shape of the sea floor, by its `kind`.")
 
     @property

@@ -83,18 +83,6 @@ class Agent:
         self.shaft_speed = fitted.shaft_speed_for
         heading = math.radians(start.heading_deg)
         self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
-        self.navigator = navigator or estimators.build(
-            NavigatorSetup(
-                vehicle=name,
-                settings=assumed,
-                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
-                actuation=vehicle.actuation,
-                period=1.0 / rates.filter,
-                rates=dict(rated(settings.sensors)),
-                usbl=settings.sensors.usbl,
-                dock=places[self.dock].pose if self.dock else None,
-            )
-        )
         self.mission = mission or missions.build(
             settings.mission.kind,
             MissionSetup(
@@ -107,6 +95,18 @@ class Agent:
                 holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
                 structures=places,
             ),
+        )
+        self.navigator = navigator or estimators.build(
+            NavigatorSetup(
+                vehicle=name,
+                settings=assumed,
+                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
+                actuation=vehicle.actuation,
+                period=1.0 / rates.filter,
+                rates=dict(rated(settings.sensors)),
+                usbl=settings.sensors.usbl,
+                dock=places[self.dock].pose if self.dock else None,
+            )
         )
         self.controller = controllers.build(
             settings.control.kind,
@@ -244,7 +244,7 @@ class Agent:
     def _warn(self, time: float, log: Log) -> None:
         """Logs the controller's warning where one begins; a controller of the user's own may have none."""
         warning = getattr(self.controller, "warning", None)
-        if self._stretches.begins(time, "authority", holds=warning is not None):
+        if warning is not None and self._stretches.begins(time, "authority"):
             log.event(time, self.name, "authority", str(warning))
 
     @property
@@ -255,8 +255,10 @@ class Agent:
 
     def overdue(self, duration: float) -> str:
         """What the log says when the time limit [s] of the run ends the mission."""
-        self._running = self._mission
-        return str(self.mission.overdue(duration))
+        try:
+            return str(self.mission.overdue(duration))
+        except Exception as error:
+            raise self._mission.blamed(error) from error.__cause__
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:

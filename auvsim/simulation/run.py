@@ -79,9 +79,7 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(
-                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
-                    )
+                    log.event(simulation.time, agent.name, "timeout", agent.overdue(scenario.duration))
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
@@ -198,8 +196,12 @@ class Simulation:
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
         self._report_limits(time)
-        for agent in self.agents:
-            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
+        agent: Any = None
+        try:
+            for agent in self.agents:
+                agent.sense(self.ticks, self.truths[agent.name], world, log)
+        except (Exception, SystemExit) as error:
+            raise agent.blame(error) from error.__cause__
         for ping, fate in self.network.poll(before, self.truths):
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
@@ -208,14 +210,17 @@ class Simulation:
             log.append(
                 "network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
             )
-        for agent in self.agents:
-            agent.receive(self.network.deliver(agent.name, time))
-            with_blame(agent, agent.navigate, self.ticks, time, log)
-        for agent in self.agents:
-            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
-            if demand is not None:
-                self._report_approach(agent)
-                world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+        try:
+            for agent in self.agents:
+                agent.receive(self.network.deliver(agent.name, time))
+                agent.navigate(self.ticks, time, log)
+                demand = agent.act(time, world.latched(agent.name), log)
+                if demand is not None:
+                    if self._listeners:
+                        self._report_approach(agent)
+                    world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+        except (Exception, SystemExit) as error:
+            raise agent.blame(error) from error.__cause__
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
 
@@ -223,11 +228,14 @@ class Simulation:
         """Logs vehicles that come out of the water or touch the sea floor."""
         world, before = self.world, time - 1.0 / self.scenario.rates.control
         for agent in self.agents:
-            name, depth = agent.name, float(self.truths[agent.name].position[2])
-            if self._stretches.begins(time, name, "surfaced", holds=world.surfaced(name)):
-                self.log.event(time, name, "surfaced", f"part of the hull is out of the water, depth {depth:.2f} m")
-            if self._stretches.begins(time, name, "grounded", holds=world.grounded(name, before)):
-                self.log.event(time, name, "grounded", f"touches the sea floor, depth {depth:.2f} m")
+            name = agent.name
+            for kind, holds, what in (
+                ("surfaced", world.surfaced(name), "part of the hull is out of the water"),
+                ("grounded", world.grounded(name, before), "touches the sea floor"),
+            ):
+                if holds and self._stretches.begins(time, name, kind):
+                    depth = float(self.truths[name].position[2])
+                    self.log.event(time, name, kind, f"{what}, depth {depth:.2f} m")
 
     def progress(self) -> ProgressState:
         """Progress of the run."""
@@ -261,7 +269,7 @@ class Simulation:
 
     def _report_approach(self, agent: Agent) -> None:
         """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
-        if not self._listeners or agent.mission is None:
+        if agent.mission is None:
             return
         attempt, dock = agent.approach, agent.mission.dock
         if attempt is not None and dock is not None and agent is self.agents[0]:
@@ -340,18 +348,6 @@ class Unrecorded:
 
     def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
         """Keeps nothing."""
-
-
-def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
-    """One turn of an agent; what a part of a user's own raises in it names that part.
-
-    Raises:
-        PartError: a part of a user's own raised something.
-    """
-    try:
-        return turn(*arguments)
-    except (Exception, SystemExit) as error:
-        raise agent.blame(error) from error.__cause__
 
 
 def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:

@@ -38,7 +38,7 @@ class LoneVehicle(Settings):
 class ShortScenario(Settings):
     """One run of one vehicle, with every number definite."""
 
-    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the run [s]")
+    duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
     datum: DatumSettings = DatumSettings()
     vehicle: LoneVehicle = LoneVehicle()
@@ -69,7 +69,7 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
     places = places or {}
     values = renewed(values)
     short: ShortScenario = validated(ShortScenario, values, places)
-    whole = _full(short)
+    whole = _full(short, places)
     try:
         return Scenario.model_validate(whole)
     except ValidationError as error:
@@ -112,12 +112,13 @@ def _of_a_kind(estimator: Mapping) -> dict:
     return {"kind": kind} | {key: value for key, value in rest.items() if key in known or key not in of_all}
 
 
-def _full(short: ShortScenario) -> dict[str, Any]:
+def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
     """The full form of a short scenario."""
     mission: Any = short.mission or short.guidance
     if short.mission is None and short.manoeuvre is not None:
         mission = {"kind": "manoeuvre", "manoeuvre": short.manoeuvre.model_dump()}
-    name = library.model_name("vehicle", short.vehicle.model)
+    name = _model_name("vehicle", short.vehicle.model, "vehicle.model", places)
+    dock = _model_name("structure", short.dock.model, "dock.model", places) if short.dock else ""
     return {
         "duration": short.duration,
         "rates": short.rates,
@@ -130,7 +131,7 @@ def _full(short: ShortScenario) -> dict[str, Any]:
             "current": short.current,
         },
         "network": {"acoustics": short.acoustics},
-        "structures": {library.model_name("structure", short.dock.model): short.dock} if short.dock else {},
+        "structures": {dock: short.dock} if short.dock else {},
         "vehicles": {
             name: {
                 "model": short.vehicle.model,
@@ -143,6 +144,14 @@ def _full(short: ShortScenario) -> dict[str, Any]:
             }
         },
     }  # fmt: skip
+
+
+def _model_name(kind: str, model: str, key: str, places: Mapping[str, str]) -> str:
+    """Name of a model, with errors that say where it was given."""
+    try:
+        return library.model_name(kind, model)
+    except InputError as error:
+        raise InputError(": ".join(part for part in (schema.place(key, places), key, str(error)) if part)) from None
 
 
 def _short_key(path: str, short: ShortScenario) -> str:

@@ -9,16 +9,13 @@ class Stretches:
     def __init__(self) -> None:
         self._last: dict[tuple[str, ...], float] = {}
 
-    def begins(self, time: float, *condition: str, holds: bool) -> bool:
-        """Whether a stretch of a condition begins now.
+    def begins(self, time: float, *condition: str) -> bool:
+        """Whether a stretch of a condition, which holds now, begins now.
 
         Args:
             time: now [s].
             condition: its names, such as of a vehicle and of what happens to it.
-            holds: whether it holds now.
         """
-        if not holds:
-            return False
         last = self._last.get(condition)
         self._last[condition] = time
         return last is None or time - last > QUIET

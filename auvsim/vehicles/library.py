@@ -94,7 +94,7 @@ def find(kind: str, name: str) -> Path:
         return Path(name).expanduser()
     folder = models_folder()
     path = folder / name / f"{name}.xml"
-    if not path.is_file():
+    if not INSTANCE.fullmatch(name) or not path.is_file():
         known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
         raise unknown_name(kind, name, known)
     return path

@@ -67,7 +67,7 @@ class DockingSettings(Settings):
         description="largest angle between heading and dock axis before the line is turned instead [deg]",
     )
     final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
-    attempts: int = Field(default=3, ge=1, description="attempts before the vehicle gives up")
+    attempts: int = Field(default=3, ge=1, le=1000, description="attempts before the vehicle gives up")
     fix_timeout: float = Field(default=30.0, gt=0, description="time without a fix that breaks an approach off [s]")
     uncertain_timeout: float = Field(
         default=10.0,
