@@ -53,13 +53,17 @@ class Craft:
         self._data, self._qpos, self._qvel, self._control = data, data.qpos, data.qvel, data.ctrl
         self._water = data.userdata[slot : slot + WATER]
         actuators = [model.actuator(f"{name}/{channel}") for channel in vehicle.actuation.channels]
-        joints = [int(actuator.trnid[0]) for actuator in actuators]
         self._controls = [int(actuator.id) for actuator in actuators]
+        self._act = data.act
+        # A thruster's command is a state of MuJoCo, or acts at once; there is nothing that turns.
+        self._thrusters = [int(model.actuator_actadr[i]) for i in self._controls if model.actuator_actnum[i]]
+        driven = [a for a in actuators if model.actuator_trntype[a.id] == mujoco.mjtTrn.mjTRN_JOINT]
+        joints = [int(actuator.trnid[0]) for actuator in driven]
         self._angles = model.jnt_qposadr[joints]
         # A velocity servo has no stiffness: its channel is a rate, any other's an angle.
         self._turning = [
             (channel, int(self._angles[channel]), int(model.jnt_dofadr[joint]))
-            for channel, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
+            for channel, (joint, actuator) in enumerate(zip(joints, driven, strict=True))
             if actuator.biasprm[1] == 0.0
         ]
         hull = model.body(f"{name}/hull")
@@ -70,6 +74,7 @@ class Craft:
             record[strips[field][0] :][:STRIPS] for field in ("strip_x", "strip_radius", "strip_half_length")
         )
         self._strips = x[radius > 0.0], radius[radius > 0.0], half[radius > 0.0]
+        self._joints_carry = len(joints) == len(actuators)
         self._rotation = np.zeros(9)
         self._matrix = self._rotation.reshape(3, 3)
 
@@ -87,7 +92,10 @@ class Craft:
         self.position[:] = flip(position)
         self._quaternion[:] = flip_quaternion(euler_to_quaternion(0.0, 0.0, heading))
         self._velocity[:3] = flip(velocity)
-        self._qpos[self._angles] = channels
+        if self._joints_carry:
+            self._qpos[self._angles] = channels
+        elif self._thrusters:
+            self._act[self._thrusters] = channels
         for channel, angle, rate in self._turning:
             self._qpos[angle], self._qvel[rate] = 0.0, channels[channel]
         self._control[self._controls] = channels
@@ -131,7 +139,10 @@ class Craft:
         nu = self._velocity * FLIP6
         over_ground = nu[:3]
         over_ground[:] = over_ground.dot(self._matrix)
-        actuators = self._qpos.take(self._angles)
+        if self._joints_carry:
+            actuators = self._qpos.take(self._angles)
+        else:
+            actuators = self._act.take(self._thrusters) if self._thrusters else self._control.take(self._controls)
         for channel, _, rate in self._turning:
             actuators[channel] = self._qvel[rate]
         return Truth(

@@ -12,7 +12,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import FLIP6, Array
 from auvsim.physics import hydrodynamics
 from auvsim.vehicles import library
-from auvsim.vehicles.actuation import Commands
+from auvsim.vehicles.actuation import Commands, FinsAndShaft
 from estimators.planar.model import PlanarParameters
 
 _SAMPLES = 600
@@ -59,9 +59,10 @@ class Level:
         except (ValueError, InputError) as error:
             raise InputError(f"model {name}: {' '.join(str(error).split())[:300]}") from None
         self.data = mujoco.MjData(self.model)
-        fins = [self.model.actuator(fin).trnid[0] for fin in vehicle.actuation.fins]
-        self._fins = [int(self.model.jnt_qposadr[joint]) for joint in fins]
-        self._shaft = int(self.model.jnt_dofadr[self.model.actuator("shaft").trnid[0]])
+        if isinstance(vehicle.actuation, FinsAndShaft):
+            fins = [self.model.actuator(fin).trnid[0] for fin in vehicle.actuation.fins]
+            self._fins = [int(self.model.jnt_qposadr[joint]) for joint in fins]
+            self._shaft = int(self.model.jnt_dofadr[self.model.actuator("shaft").trnid[0]])
         self.actuation = vehicle.actuation
         hull = next((b for b in hydrodynamics.bodies(self.model) if b.kind == "hull"), None)
         if hull is None:
@@ -121,6 +122,11 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
 def _fit_model(vehicle: str, path: Path, text: str, speed: float, density: float) -> PlanarFit:
     """The fit of a vehicle; its file and text are keys of the cache."""
     level = Level(vehicle, density)
+    if not isinstance(level.actuation, FinsAndShaft):
+        raise InputError(
+            f"no planar model of '{vehicle}', which is driven by thrusters: docking, tracks, manoeuvres and filters "
+            "need fins and a shaft"
+        )
     shaft = _steady_shaft(level, vehicle, speed)
     generator = np.random.default_rng(0)
     draws = generator.uniform(-1.0, 1.0, (_SAMPLES, 5))

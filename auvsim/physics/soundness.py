@@ -14,6 +14,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.physics.planar_fit import Level
 from auvsim.vehicles import library
+from auvsim.vehicles.actuation import FinsAndShaft
 
 TRIM = 0.1  # largest relative difference of buoyancy and weight; vehicles are trimmed to a few per cent
 SPEED = 2.5  # through the water, at which controls and steps are tried: about the top speed of a torpedo AUV [m/s]
@@ -77,6 +78,8 @@ def _check(vehicle: str, path: Path, text: str, density: float) -> None:
             f"model {vehicle}: it displaces {density * level.volume:.4g} kg of water and has a mass of "
             f"{level.mass:.4g} kg; correct hull_displaced_volume or the masses, they must agree to {TRIM:.0%}"
         )
+    if not isinstance(level.actuation, FinsAndShaft):
+        return
     straight = level.forces(SPEED)
     small = 0.1 * level.actuation.fin_limit
     for name, axis, says in (("rudder", 5, "turns to starboard"), ("elevator", 4, "dives")):

@@ -155,3 +155,83 @@ class FinsAndShaft:
         fins = channels[:-1]
         rudder, elevator = (sum(map(mul, row, fins)) for row in self._inverse)
         return Commands(float(rudder), float(elevator), float(channels[-1]))
+
+
+class Wrench(NamedTuple):
+    """Demands on a vehicle that is driven by thrusters: force and moment about its origin, forward-starboard-down."""
+
+    surge: float  # [N]
+    sway: float  # [N]
+    heave: float  # [N]
+    roll: float  # [N m]
+    pitch: float  # [N m]
+    yaw: float  # [N m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thrusters:
+    """Fixed thrusters and a force and moment that they share, by the pseudo-inverse of where they push.
+
+    The least sum of squared thrusts carries a demand out. Beyond a limit all thrusts are scaled together, so that the
+    direction of force and moment is kept. The bollard curve and its dead band are undone; inflow is not.
+
+    Raises:
+        InputError: a shape does not fit, or the thrusters do not push in all six directions.
+    """
+
+    channels: tuple[str, ...]  # n thrusters
+    matrix: Array  # (6, n) wrench of each thrust of 1 N ahead
+    thrust: Array  # (n, 2) at full command ahead and astern, both positive [N]
+    dead_band: Array  # (n,) of the command
+    lags: Array  # (n,) time constants [s]
+
+    demands = (
+        Demand("surge", "N", "force ahead"),
+        Demand("sway", "N", "force to starboard"),
+        Demand("heave", "N", "force downward"),
+        Demand("roll", "N m", "moment about the axis ahead"),
+        Demand("pitch", "N m", "moment about the axis to starboard, nose up"),
+        Demand("yaw", "N m", "moment about the axis downward, to starboard"),
+    )
+
+    def __post_init__(self) -> None:
+        count = len(self.channels)
+        shapes = self.matrix.shape, self.thrust.shape, self.dead_band.shape, self.lags.shape
+        if shapes != ((6, count), (count, 2), (count,), (count,)):
+            raise InputError(f"{count} thrusters need arrays of {count}, not {shapes}")
+        if np.linalg.matrix_rank(self.matrix) < 6:
+            raise InputError(f"the {count} thrusters do not push and turn in all six directions")
+
+    @property
+    def units(self) -> tuple[str, ...]:
+        """Commands are shares of full command."""
+        return ("1",) * len(self.channels)
+
+    @property
+    def limits(self) -> Array:
+        """Smallest and largest command (n, 2)."""
+        return np.tile([-1.0, 1.0], (len(self.channels), 1))
+
+    @cached_property
+    def _inverse(self) -> Array:
+        return np.asarray(np.linalg.pinv(self.matrix), dtype=np.float64)
+
+    def at_speed(self, shaft_speed: float) -> Wrench:
+        """No force: a thruster-driven vehicle has no shaft to hold a speed with."""
+        return Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+
+    def allocate(self, demand: Sequence[float]) -> list[float]:
+        """Commands of the n thrusters, -1 to 1, that carry out a wrench (6,)."""
+        thrusts = self._inverse @ np.asarray(demand, dtype=float)
+        full = np.where(thrusts >= 0.0, self.thrust[:, 0], self.thrust[:, 1])
+        shares = np.abs(thrusts) / full
+        shares /= max(1.0, float(shares.max()))
+        rate = np.sqrt(shares)
+        return (np.sign(thrusts) * np.where(rate > 0.0, self.dead_band + (1.0 - self.dead_band) * rate, 0.0)).tolist()
+
+    def effective(self, channels: "Sequence[float] | Array") -> Wrench:
+        """Wrench to which commands (n,) amount at the bollard."""
+        command = np.clip(np.asarray(channels, dtype=float), -1.0, 1.0)
+        rate = np.maximum(np.abs(command) - self.dead_band, 0.0) / (1.0 - self.dead_band)
+        full = np.where(command >= 0.0, self.thrust[:, 0], self.thrust[:, 1])
+        return Wrench(*(self.matrix @ (np.sign(command) * full * rate**2)).tolist())

@@ -12,8 +12,8 @@ from dm_control import mjcf
 
 import auvsim
 from auvsim.base.errors import InputError, unknown_name
-from auvsim.base.frames import Array
-from auvsim.vehicles.actuation import FinsAndShaft
+from auvsim.base.frames import Array, flip
+from auvsim.vehicles.actuation import FinsAndShaft, Thrusters
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class Vehicle:
     model: str  # name of the model; an instance in a scene has a name of its own
     root: Any  # PyMJCF RootElement, a fresh one each load
     source: str  # text of the MJCF file
-    actuation: FinsAndShaft
+    actuation: Any  # FinsAndShaft or Thrusters
     nose: float  # distance of the nose ahead of the body origin [m]
     length: float  # from the nose to the aftmost body, which is the propeller of a torpedo [m]
 
@@ -223,6 +223,58 @@ def _lag(root: Any, name: str) -> float:
     return float(np.atleast_1d(inertia)[0] / gain) if inertia is not None and gain else 0.0
 
 
+def _is_driven_by_thrusters(root: Any) -> bool:
+    """Whether a vehicle has thrusters and no shaft."""
+    return root.find("actuator", "shaft") is None and any(n.name.endswith("_thrust") for n in root.find_all("numeric"))
+
+
+def _fins_and_shaft(root: Any, name: str) -> FinsAndShaft:
+    if root.find("actuator", "shaft") is None:
+        known = ", ".join(str(a.name) for a in root.find_all("actuator")) or "none"
+        raise InputError(f"model {name} lacks the actuator 'shaft', that of its propeller; there are {known}")
+    fins = tuple(a.name for a in root.find_all("actuator") if a.name != "shaft")
+    matrix = _allocation(root, name, fins)
+    limits = np.stack([_limits(root, name, channel) for channel in (*fins, "shaft")])
+    lags = np.array([_lag(root, channel) for channel in (*fins, "shaft")])
+    return FinsAndShaft(fins=fins, matrix=matrix, limits=limits, lags=lags)
+
+
+def _thrusters(root: Any, name: str) -> Thrusters:
+    """The thrusters of a vehicle, each a body of the hull; what each pushes is from its body's place and attitude."""
+    channels = tuple(str(actuator.name) for actuator in root.find_all("actuator"))
+    columns, thrust, dead, lags = [], [], [], []
+    for channel in channels:
+        body = root.find("body", channel)
+        if body is None or body.parent.name != "hull" or body.joint:
+            raise InputError(
+                f"model {name}: thruster '{channel}' must be a body of the hull, of its actuator's name, fixed"
+            )
+        place = flip(np.zeros(3) if body.pos is None else np.array(body.pos, dtype=float))
+        quaternion = np.array((1.0, 0.0, 0.0, 0.0) if body.quat is None else body.quat, dtype=float)
+        if any(getattr(body, other) is not None for other in ("euler", "axisangle", "xyaxes", "zaxis")):
+            raise InputError(f"model {name}: give the attitude of thruster '{channel}' as quat")
+        direction = flip(_ahead(quaternion / np.linalg.norm(quaternion)))
+        columns.append(np.concatenate([direction, np.cross(place, direction)]))
+        thrust.append(_numeric(root, name, f"{channel}_thrust"))
+        band = root.find("numeric", f"{channel}_dead_band")
+        dead.append(0.0 if band is None else float(np.ravel(band.data)[0]))
+        lag = _attribute(root.find("actuator", channel), "dynprm")
+        lags.append(0.0 if lag is None else float(np.ravel(lag)[0]))
+    return Thrusters(
+        channels=channels,
+        matrix=np.stack(columns, axis=-1),
+        thrust=np.array(thrust),
+        dead_band=np.array(dead),
+        lags=np.array(lags),
+    )
+
+
+def _ahead(quaternion: Array) -> Array:
+    """The x axis (3,) of a body with a quaternion (4,), in its parent's axes."""
+    w, x, y, z = quaternion.tolist()
+    return np.array((1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)), dtype=float)
+
+
 def vehicle(name: str) -> Vehicle:
     """Loads a vehicle: `remus100`, or the path of an MJCF file that keeps the contract of models/README.md.
 
@@ -234,19 +286,13 @@ def vehicle(name: str) -> Vehicle:
     hull = root.find("body", "hull")
     if hull is None:
         raise InputError(f"model {name} lacks the body 'hull'")
-    if root.find("actuator", "shaft") is None:
-        known = ", ".join(str(a.name) for a in root.find_all("actuator")) or "none"
-        raise InputError(f"model {name} lacks the actuator 'shaft', that of its propeller; there are {known}")
-    fins = tuple(a.name for a in root.find_all("actuator") if a.name != "shaft")
-    matrix = _allocation(root, name, fins)
-    limits = np.stack([_limits(root, name, channel) for channel in (*fins, "shaft")])
-    lags = np.array([_lag(root, channel) for channel in (*fins, "shaft")])
     nose = _site_x(root, name, "nose")
     aftmost = min((float(body.pos[0]) for body in hull.body if body.pos is not None), default=-nose)
     try:
-        actuation = FinsAndShaft(fins=fins, matrix=matrix, limits=limits, lags=lags)
+        actuation = _thrusters(root, name) if _is_driven_by_thrusters(root) else _fins_and_shaft(root, name)
     except InputError as error:
-        raise InputError(f"model {name}: {error}") from None
+        text = str(error)
+        raise InputError(text if text.startswith("model ") else f"model {name}: {text}") from None
     return Vehicle(model=root.model, root=root, source=text, actuation=actuation, nose=nose, length=nose - aftmost)
 
 

@@ -29,6 +29,7 @@ def row(variant: int, trial: int) -> dict:
         "trial": trial,
         "docked": not failed,
         "docked_first": not failed and trial % 5 != 0,
+        "docked_aligned": not failed and trial % 5 != 1,
         "attempts": 0 if missing else 3 if failed else 1 + (trial % 5 == 0),
         "failure": failure,
         "failure_text": says.get(failure),
@@ -62,7 +63,7 @@ def rates(table: list[dict], variants: tuple[str, ...]) -> list[Rate]:
     """How often each variant docked."""
     found = []
     for name in variants:
-        for quantity in ("docked", "docked_first"):
+        for quantity in ("docked", "docked_first", "docked_aligned"):
             done = [r[quantity] for r in table if r["variant"] == name]
             low, high = wilson(sum(done), len(done))
             found.append(

@@ -98,6 +98,8 @@ def test_surfaced_is_when_the_highest_part_of_the_hull_is_out():
     highest = 0.8 * np.sin(pitch) + RADIUS * np.cos(pitch)  # of a cylinder as long as the strips
     assert not at([3.0, -2.0, highest + 0.03], pitch)  # the end strip's disc is wider by its half length
     assert at([3.0, -2.0, highest - 0.03], pitch)
+    assert not at([3.0, -2.0, 0.81], 0.5 * np.pi)  # upright, the nose 0.8 m above the origin
+    assert at([3.0, -2.0, 0.79], 0.5 * np.pi)
 
 
 def test_surfaced_follows_the_waves():

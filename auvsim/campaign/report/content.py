@@ -12,7 +12,12 @@ from auvsim.campaign.statistics import Difference, Nees, Rate
 
 Row = Mapping[str, Any]  # one vehicle of a trial, as `table.rows` gives it; None where there is no value
 
-WORDS = {"docked": "docked", "docked_first": "docked on the first attempt"}  # for columns that say whether
+# For columns that say whether.
+WORDS = {
+    "docked": "docked",
+    "docked_first": "docked on the first attempt",
+    "docked_aligned": "docked and aligned",
+}
 FILES = ("plan.yaml", "table.csv", "table.parquet", "timings.csv")
 
 

@@ -37,7 +37,7 @@ def headline(content: Content) -> list[str]:
     quantities = content.layout.rates
     found = [[content.rate(name, quantity) for quantity in quantities] for name in content.variants]
     found.sort(key=lambda rates: [-rate.successes / max(rate.trials, 1) for rate in rates])
-    docking = quantities == ("docked", "docked_first")
+    docking = quantities[:2] == ("docked", "docked_first")
     all_of_them = " of all vehicles" if content.layout.fleet else ""
     said = []
     for rate, *others in found:
