@@ -16,7 +16,10 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import PLANAR_STATES, Estimate
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
+from estimators.core.estimator import StateFilter
+from estimators.core.history import Node
 from estimators.core.outliers import Outliers
+from estimators.core.types import Gaussian
 from estimators.docking.estimator import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
 from estimators.docking.models import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.docking.usbl import UsblFix, UsblModel
@@ -97,6 +100,26 @@ class DockingNavigator:
             reinitialised=result.reinitialised,
             outcomes=result.outcomes,
         )
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """See `Buffered`."""
+        return self._estimator.nodes
+
+    @property
+    def filter(self) -> StateFilter:
+        """See `Buffered`."""
+        return self._estimator.filter
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """See `Buffered`."""
+        shift = np.zeros(len(self.states))
+        shift[:2] = self._dock
+        n = shift.size
+        return [
+            (time, Gaussian(mean=b.mean[:n] + shift, covariance=b.covariance[:n, :n]))
+            for time, b in self._estimator.smoothed()
+        ]
 
     def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:
         if not headings:

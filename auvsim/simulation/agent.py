@@ -16,14 +16,14 @@ from auvsim.missions import registry as missions
 from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
-from auvsim.navigation.navigator import Navigator, NavigatorSetup
-from auvsim.physics import planar_sets
+from auvsim.navigation.navigator import Navigator
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
 from auvsim.sensors.sensor import Surroundings
 from auvsim.simulation.scenario import Scenario
-from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.simulation.sensor_settings import on_board
+from auvsim.simulation.setups import model_speed, navigator_setup, usbl_dock
 from auvsim.vehicles.library import Vehicle
 
 
@@ -72,26 +72,14 @@ class Agent:
     ) -> None:
         self.name, self.vehicle = name, vehicle
         settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
-        start, assumed = settings.start, settings.estimator
-        model_speed = getattr(assumed, "model_speed", 1.0)
+        start = settings.start
         # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
         # estimator.
-        fitted = fit_planar_model(settings.model, model_speed, density)
+        fitted = fit_planar_model(settings.model, model_speed(settings.estimator), density)
         self.shaft_speed = fitted.shaft_speed_for
         heading = math.radians(start.heading_deg)
-        self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
-        self.navigator = navigator or estimators.build(
-            NavigatorSetup(
-                vehicle=name,
-                settings=assumed,
-                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
-                actuation=vehicle.actuation,
-                period=1.0 / rates.filter,
-                rates=dict(rated(settings.sensors)),
-                usbl=settings.sensors.usbl,
-                dock=places[self.dock].pose if self.dock else None,
-            )
-        )
+        self.dock = usbl_dock(plan, name)  # whose USBL serves it
+        self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
         self.mission = mission or missions.build(
             settings.mission.kind,
             MissionSetup(

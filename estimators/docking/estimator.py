@@ -15,9 +15,10 @@ import numpy as np
 from estimators.core import smoothing
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
-from estimators.core.history import Filter, History, Node
+from estimators.core.estimator import StateFilter
+from estimators.core.history import History, Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement, Outcome, ProcessModel
+from estimators.core.types import Array, Gaussian, Measurement, Outcome
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.interacting import InteractingFilter
 from estimators.docking.models import (
@@ -70,17 +71,13 @@ class DockingEstimate:
     outcomes: tuple[Outcome, ...] = ()
 
 
-class DockingFilter(Filter[Any], Protocol):
+class DockingFilter(StateFilter, Protocol):
     """A filter for a `DockingEstimator`.
 
     Its states have `belief` (eight states and biases), `outliers`, `innovation` and `verdicts`, see `History`.
     """
 
     noise: DockingNoise
-
-    def process_after(self, state: Any) -> ProcessModel:
-        """The process by which it went on from a state, for `smoothing`; ParameterError if there is none that fits."""
-        ...
 
 
 class DockingEstimator:
@@ -104,7 +101,7 @@ class DockingEstimator:
         keep: float = 30.0,
         compensate_delay: bool = True,
     ) -> None:
-        self._filter = filter
+        self.filter = filter
         self._usbl = usbl or UsblModel()
         self._step, self._keep = step, keep
         self._compensate_delay = compensate_delay
@@ -114,7 +111,7 @@ class DockingEstimator:
     def reset(self) -> None:
         """Forgets everything, counts included."""
         self._history: History[Any] = History(
-            self._filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
+            self.filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
         )
         self._restarts = 0  # of the filter
         self._outliers_before = self._outliers = 0  # rejected before its last start, and in all
@@ -126,7 +123,7 @@ class DockingEstimator:
             ParameterError: The filter cannot be smoothed: its covariance does not hold the error of the current.
         """
         nodes = self._history.nodes
-        beliefs = smoothing.smooth(nodes, self._filter.process_after)
+        beliefs = smoothing.smooth(nodes, self.filter.process_after)
         return [(node.time, belief) for node, belief in zip(nodes[len(nodes) - len(beliefs) :], beliefs, strict=True)]
 
     @property
