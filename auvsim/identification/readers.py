@@ -46,7 +46,7 @@ def read(
 def _signals(
     path: Path, mapping: dict[str, ColumnSettings], vehicle: str | None
 ) -> tuple[list[signals.Signals], list[str]]:
-    if not _is_trial_log(path):
+    if not is_trial_log(path):
         return table_records.signals(path, mapping)
     found, notes, model = log_records.signals(path)
     if vehicle is not None and model != vehicle:
@@ -54,7 +54,8 @@ def _signals(
     return found, notes
 
 
-def _is_trial_log(path: Path) -> bool:
+def is_trial_log(path: Path) -> bool:
+    """Whether a file is a log of auvsim's, whole or not."""
     try:
         with h5py.File(path, "r") as file:
             return "format_version" in file.attrs and "scenario" in file.attrs

@@ -17,7 +17,7 @@ from auvsim.identification.table_files import Column, load
 from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
-_NEEDED = ("time", "rudder", "shaft_speed")
+NEEDED = ("time", "rudder", "shaft_speed")
 _EXAMPLES = {"time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]"}
 
 
@@ -40,8 +40,15 @@ class _Table(NamedTuple):
     time: Array  # of the rows [s]
 
 
-def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Signals], list[str]]:
+def signals(
+    path: Path, mapping: Mapping[str, ColumnSettings], *, inputs: bool = True
+) -> tuple[list[Signals], list[str]]:
     """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
+
+    Args:
+        path: Of the file.
+        mapping: Which column is what, by quantity.
+        inputs: Whether rudder and shaft speed must be there.
 
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
@@ -55,7 +62,7 @@ def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Sig
         for name, s in mapping.items()
         if s.constant is not None
     }
-    _require(path, by_quantity.keys() | constants.keys(), list(columns))
+    _require(path, by_quantity.keys() | constants.keys(), list(columns), NEEDED if inputs else NEEDED[:1])
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
     time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
@@ -65,15 +72,15 @@ def signals(path: Path, mapping: Mapping[str, ColumnSettings]) -> tuple[list[Sig
     pieces = list(_pieces(table))
     for number, piece in enumerate(pieces, start=1):
         label = path.name if len(pieces) == 1 else f"{path.name}, {piece.kind or f'part {number}'}"
-        one, more = _signals(table, piece, label)
+        one, more = _signals(table, piece, label, inputs)
         found += [one] if one is not None else []
         notes += more
     return found, notes
 
 
-def _require(path: Path, there: set[str], columns: Sequence[str]) -> None:
+def _require(path: Path, there: set[str], columns: Sequence[str], needed: Sequence[str]) -> None:
     there = there | ({"rudder"} if "rudder_command" in there else set())
-    for quantity in _NEEDED:
+    for quantity in needed:
         if quantity not in there:
             raise InputError(
                 f"{path}: no column is the {quantity.replace('_', ' ')}; there are {', '.join(columns)}; "
@@ -127,7 +134,7 @@ def _pieces(table: _Table) -> Iterator[_Piece]:
             yield _Piece(slice(start, stop), float(inside.min()), float(inside.max()), kind)
 
 
-def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, list[str]]:
+def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Signals | None, list[str]]:
     found: dict[str, Signal] = {}
     deviations: dict[str, float] = {}
     notes: list[str] = []
@@ -152,7 +159,7 @@ def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, 
         ends = np.array([piece.start, 0.5 * (piece.start + piece.stop), piece.stop])
         found[quantity] = Signal(times=ends, values=np.full(3, value))
     _combine(found)
-    lacking = [quantity for quantity in ("rudder", "shaft_speed") if quantity not in found]
+    lacking = [quantity for quantity in NEEDED[1:] if quantity not in found] if inputs else []
     if lacking:
         return None, [*notes, f"{label}: left out: no {' and no '.join(lacking)} in it"]
     for quantity in set(MEASURED) & found.keys() - {"north", "east"}:

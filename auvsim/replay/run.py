@@ -42,8 +42,8 @@ def settings_for(recording: Recording, kind: str | None) -> Any:
     own = recording.own
     if kind is None or kind == own.kind:
         return own
-    if not is_own(kind) and kind not in registry.ESTIMATORS:
-        raise unknown_name("estimator", kind, [*registry.ESTIMATORS, "package.module:factory of your own"])
+    if not is_own(kind) and kind not in registry.ALL:
+        raise unknown_name("estimator", kind, [*registry.ALL, "package.module:factory of your own"])
     known = estimator_keys(kind) - {"kind", "settings"}
     values = {key: value for key, value in own.model_dump().items() if key in known}
     try:

@@ -165,7 +165,9 @@ class Agent:
         views = (e.position, e.heading, e.velocity, e.current)
         log.append(self._path("estimate"), (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
         for o in e.outcomes:
-            log.append(self._path("measurements"), (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
+            log.append(
+                self._path("measurements"), (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
+            )
 
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""

@@ -1,6 +1,7 @@
 """What each measurement of a delay buffer said that the filter did not know: its innovation, in order of stamps."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from estimators.core import ekf
@@ -26,7 +27,7 @@ def innovations(nodes: Sequence[Node[Any]], filter: StateFilter) -> Iterator[Inn
     Raises:
         ParameterError: The filter cannot say how it went on from a state.
     """
-    for before, node in zip(nodes, nodes[1:], strict=False):
+    for before, node in pairwise(nodes):
         if before.state is None or node.state is None or node.failed or not node.measurements:
             continue
         process = filter.process_after(before.state)

@@ -84,7 +84,10 @@ def test_divergence_is_diagnosed(tmp_path: Path, capsys: pytest.CaptureFixture) 
         (["--dock.model", "remus100"], "model remus100 lacks "),
         (["--estimator", "kalman"], "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm"),
         (["--estimator", "nowhere:factory"], "estimator 'nowhere:factory': ModuleNotFoundError"),
-        (["--vehicle.start.depth", "100"], "vehicle 'remus100': start depth 100 m is not between the surface and the sea floor"),
+        (
+            ["--vehicle.start.depth", "100"],
+            "vehicle 'remus100': start depth 100 m is not between the surface and the sea floor",
+        ),
     ],
 )
 def test_what_cannot_be_loaded_is_named(
