@@ -10,6 +10,7 @@ from auvsim.acoustics.message import Delivery
 from auvsim.base.frames import Array
 from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog
+from auvsim.navigation.gate import Gate
 from auvsim.navigation.navigator import NavigatorSetup
 
 
@@ -42,6 +43,12 @@ class Recording:
     setup: Callable[[Any], NavigatorSetup]  # of an estimator's settings, or of None: those of the run
     own: Any  # settings of the run's own estimator
     vehicle: VehicleLog | None = None  # the log that it is of, where that is a trial's
+
+    @property
+    def gate(self) -> Gate:
+        """The gate before the estimator, as in the run; in tables, which round, the same value again is no fault."""
+        setup = self.setup(None)
+        return Gate(setup.sensors, setup.actuation, frozen=self.vehicle is not None)
 
     def ticks(self) -> Iterator[Tick]:
         """The updates, with what came between."""

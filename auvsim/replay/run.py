@@ -68,10 +68,12 @@ def replay(recording: Recording, kind: str | None = None, *, smooth: bool = Fals
     if smooth and not isinstance(navigator, Buffered):
         raise InputError(f"estimator '{settings.kind}' keeps no delay buffer; only one that does can be smoothed")
     settled = _Settled(navigator, smooth)
-    estimates = []
+    estimates, gate = [], recording.gate
     for tick in recording.ticks():
         try:
-            estimates.append(navigator.update(*tick))
+            readings, gated = gate.passed(tick.readings)
+            estimate = navigator.update(tick.time, readings, tick.messages, tick.commands)
+            estimates.append(replace(estimate, outcomes=(*gated, *estimate.outcomes)) if gated else estimate)
             settled.look(tick.time)
         except EstimatorError as error:
             raise InputError(f"estimator '{settings.kind}' of {recording.name} at {tick.time:g} s: {error}") from None
@@ -125,4 +127,5 @@ def _refined(estimate: Estimate, belief: Gaussian | None, names: list[str]) -> E
     return replace(
         estimate, position=np.array((north, east, estimate.position[2])), heading=heading,
         velocity=np.array(rest[:3]), current=np.array(rest[3:]), covariance=belief.covariance, mean=belief.mean,
+        outcomes=(),
     )  # fmt: skip

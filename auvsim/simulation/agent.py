@@ -16,6 +16,7 @@ from auvsim.missions import registry as missions
 from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
+from auvsim.navigation.gate import Gate
 from auvsim.navigation.navigator import Navigator
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import Truth
@@ -25,6 +26,7 @@ from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board
 from auvsim.simulation.setups import model_speed, navigator_setup, usbl_dock
 from auvsim.vehicles.library import Vehicle
+from estimators.core.types import Outcome
 
 
 class Log(Protocol):
@@ -106,6 +108,8 @@ class Agent:
             (_sensor(key, found, noise(key), vehicle), round(rates.control / found.rate))
             for key, found in on_board(settings.sensors)
         ]
+        self.gate = Gate(dict(on_board(settings.sensors)), vehicle.actuation)
+        self._gated: list[Outcome] = []  # refused by it since the last update of the estimator
         self.estimate: Estimate | None = None
         self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
         self._filter_ticks = round(rates.control / rates.filter)
@@ -135,11 +139,22 @@ class Agent:
 
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
         """Takes the readings that are due at a control tick."""
-        self._readings, self._messages = [], []
+        taken, self._messages = [], []
         for sensor, every in self.sensors:
             if ticks % every == 0 and (reading := sensor.measure(truth, world)) is not None:
                 log.reading(self.name, reading)
-                self._readings.append(reading)
+                taken.append(reading)
+        suspect = dict(self.gate.refused)
+        self._readings, refused = self.gate.passed(taken)
+        self._gated += refused
+        for outcome in refused:
+            if outcome.kind not in suspect:
+                text = f"readings of {outcome.kind}: {outcome.reason.replace('_', ' ')}"
+                log.event(truth.time, self.name, "refused", text)
+        for reading in self._readings if suspect else ():
+            if (count := self.gate.refused.pop(reading.sensor, 0)) > 0:
+                text = f"{reading.sensor} is heard again; {count} reading{'s' * (count > 1)} refused"
+                log.event(truth.time, self.name, "heard", text)
 
     def receive(self, deliveries: Sequence[Delivery]) -> None:
         """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
@@ -164,7 +179,8 @@ class Agent:
         self.estimate = e
         views = (e.position, e.heading, e.velocity, e.current)
         log.append(self._path("estimate"), (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
-        for o in e.outcomes:
+        outcomes, self._gated = (*self._gated, *e.outcomes), []
+        for o in outcomes:
             log.append(
                 self._path("measurements"), (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
             )
