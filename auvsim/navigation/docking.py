@@ -13,8 +13,11 @@ from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, wrap
 from auvsim.base.reading import Reading
+from auvsim.navigation import aids
 from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 from estimators.core.estimator import StateFilter
 from estimators.core.history import Node
@@ -36,19 +39,22 @@ class DockingNavigator:
     """A docking estimator in a run.
 
     Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
-    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the
-    gauge's, smoothed.
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. So do
+    ranges, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed.
 
     Args:
         estimator: in whose axes the dock's mouth is the origin.
         actuation: of the vehicle.
         dock: (2,) north, east of the dock's mouth [m].
+        aids: settings of the sensors it uses besides, by name.
     """
 
     states = PLANAR_STATES
 
-    def __init__(self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array) -> None:
-        self._estimator, self._actuation, self._dock = estimator, actuation, dock
+    def __init__(
+        self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array, aids: Mapping[str, Any] | None = None
+    ) -> None:
+        self._estimator, self._actuation, self._dock, self._aids = estimator, actuation, dock, dict(aids or {})
         self.reset()
 
     def reset(self) -> None:
@@ -62,6 +68,7 @@ class DockingNavigator:
     ) -> Estimate:
         """The estimate at `time`, see `Navigator.update`."""
         headings, stamps, drives, fixes = [], [], [], []
+        aided: dict[Any, Reading] = {}  # the last reading of a sensor, but every range
         for reading in readings:
             if reading.sensor == "compass":
                 headings.append(float(reading.value[0]))
@@ -77,12 +84,18 @@ class DockingNavigator:
                     position=(x, y, z), heading=heading, pitch=pitch, roll=roll,
                 )  # fmt: skip
                 fixes.append(fix)
+            elif reading.sensor in self._aids:
+                is_range = isinstance(self._aids[reading.sensor], RangeSettings)
+                aided[reading.sensor, reading.sequence if is_range else None] = reading
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
             rudder, _, shaft_speed = self._actuation.effective(
                 [sum(values) / len(drives) for values in zip(*drives, strict=True)]
             )
-        result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
+        depth, origin = self._depth.value or 0.0, (float(self._dock[0]), float(self._dock[1]))
+        more = [m for r in aided.values() for m in measurements(r, self._aids[r.sensor], depth, origin)]
+        heading = self._heading_now(time, headings, stamps)
+        result = self._estimator.tick(time, heading, rudder, shaft_speed, fixes, more)
         mean = result.mean.copy()
         mean[:2] += self._dock
         self._yaw_rate = float(mean[5])
@@ -134,17 +147,25 @@ def navigator(
 ) -> DockingNavigator:
     """A docking filter for a vehicle; what it assumes are the estimator's settings, never the sensors' draws."""
     s, actuation = setup.settings, setup.actuation
+    used = aids.used(setup.sensors, getattr(s, "use", ()))
     if setup.dock is None:
-        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': needs the USBL of a dock; give a structure")
+        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': needs the place of a dock; give a structure")
+    if not setup.usbl.enabled and len(of_kind(used, RangeSettings)) < 2:
+        raise InputError(
+            f"estimator '{s.kind}' of '{setup.vehicle}': without USBL it needs ranges to two beacons or more; "
+            "give sensors of kind range, or sensors.usbl.enabled: true"
+        )
     if not isinstance(actuation, FinsAndShaft):
         raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft")
     readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
-    noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings))
+    biases = {**aids.biases(used, setup.sensors.get("compass")), **base.biases}
+    noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings), biases=biases)
     white = 0.0 if "dock_heading" in base.biases else math.radians(s.dock_heading_deg)
     model = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=white)
-    filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2])
+    more = {"aids": aids.assumed(used)} if used else {}
+    filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2], **more)
     estimator = DockingEstimator(filter_, model, step=setup.period, compensate_delay=delayed)
-    return DockingNavigator(estimator, actuation, setup.dock.position[:2])
+    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used)
 
 
 def regular_ekf(setup: NavigatorSetup) -> Navigator:

@@ -15,9 +15,10 @@ from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.types import Measurement
+from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
+from estimators.docking.models import COMPASS
 
-COMPASS, GYRO, FIX, RANGE = "compass", "gyro", "fix", "range"  # kinds of measurement
-BOTTOM, WATER = "dvl_bottom", "dvl_water"
+FIX = "fix"  # kind of measurement
 
 
 class FixSettings(Settings):
@@ -26,7 +27,9 @@ class FixSettings(Settings):
     noise: float = Field(default=0.5, gt=0.0, description="white noise of each axis, sd [m]")
 
 
-def measurements(reading: Reading, settings: Any, depth: float) -> Iterator[Measurement]:
+def measurements(
+    reading: Reading, settings: Any, depth: float, origin: tuple[float, float] = (0.0, 0.0)
+) -> Iterator[Measurement]:
     """What a reading says of the horizontal motion; nothing, where its sensor is none that is known here.
 
     A DVL's track that is lost says nothing; components of one that are not numbers are for the filter to refuse.
@@ -35,6 +38,7 @@ def measurements(reading: Reading, settings: Any, depth: float) -> Iterator[Meas
         reading: Of a compass, gyro, DVL, range or position.
         settings: Of its sensor.
         depth: Of the vehicle [m].
+        origin: Of the filter's axes, north and east [m].
     """
     value = reading.value
     match settings:
@@ -52,7 +56,7 @@ def measurements(reading: Reading, settings: Any, depth: float) -> Iterator[Meas
                     yield _measurement(kind, reading, track, *sigma[:2])
         case RangeSettings():
             north, east, down = settings.beacon
-            place = (north, east, down - depth)
+            place = (north - origin[0], east - origin[1], down - depth - settings.transponder[2])
             yield _measurement(RANGE, reading, value, settings.noise, source=reading.sensor, parameters=place)
         case FixSettings():
             yield _measurement(FIX, reading, value[:2], settings.noise, settings.noise)

@@ -11,7 +11,7 @@ from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.reading import Reading
 from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
-from auvsim.navigation.measurements import BOTTOM, COMPASS, FIX, GYRO, RANGE, FixSettings, measurements, of_kind
+from auvsim.navigation.measurements import FIX, FixSettings, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.sensors.range import RangeSettings
 from estimators.core.estimator import Estimator
@@ -21,6 +21,8 @@ from estimators.core.models import sensors
 from estimators.core.models.motion import constant_velocity, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
+from estimators.docking.aids import BOTTOM, GYRO, RANGE
+from estimators.docking.models import COMPASS
 from estimators.docking.usbl import UsblFix, UsblModel
 
 BIASES = {"compass_bias": "rad", "gyro_bias": "rad/s"}
@@ -43,7 +45,7 @@ class ReckoningNavigator:
         self.states = dict(motion.space.units)
         self._space, self._sensors = motion.space, dict(setup.sensors)
         self._compass_bias = math.radians(s.compass_error_deg)
-        self._located = setup.dock is not None or bool(of_kind(self._sensors, FixSettings))
+        self._located = (setup.dock is not None and setup.usbl.enabled) or bool(of_kind(self._sensors, FixSettings))
         self._ranged = bool(of_kind(self._sensors, RangeSettings))
         self._dock = None if setup.dock is None else setup.dock.position[:2]
         self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))

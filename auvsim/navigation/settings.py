@@ -47,6 +47,9 @@ class AugmentedSettings(_Assumed):
     dock_heading_state: bool = Field(
         default=True, description="whether that error is constant, and estimated, instead of new with each fix"
     )
+    use: tuple[Literal["gyro", "dvl", "range"], ...] = Field(
+        default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass, depth and USBL"
+    )
 
 
 class InteractingSettings(AugmentedSettings):

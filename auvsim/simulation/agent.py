@@ -17,10 +17,12 @@ from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
 from auvsim.navigation.gate import Gate
+from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.navigator import Navigator
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
+from auvsim.sensors.range import RangeSettings
 from auvsim.sensors.sensor import Surroundings
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board
@@ -80,7 +82,8 @@ class Agent:
         fitted = fit_planar_model(settings.model, model_speed(settings.estimator), density)
         self.shaft_speed = fitted.shaft_speed_for
         heading = math.radians(start.heading_deg)
-        self.dock = usbl_dock(plan, name)  # whose USBL serves it
+        self.dock = usbl_dock(plan, name)
+        self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does
         self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
         self.mission = mission or missions.build(
             settings.mission.kind,
@@ -93,6 +96,8 @@ class Agent:
                 period=1.0 / rates.control,
                 holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
                 structures=places,
+                usbl=self.serves,
+                ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
             ),
         )
         self.controller = controllers.build(

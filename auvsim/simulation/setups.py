@@ -15,7 +15,7 @@ def model_speed(settings: Any) -> float:
 
 
 def usbl_dock(plan: Scenario, name: str) -> str | None:
-    """The structure whose USBL serves a vehicle, or None."""
+    """The structure from which a vehicle is located, or None."""
     return plan.dock_of(name, plan.vehicles[name].sensors.usbl.dock)
 
 

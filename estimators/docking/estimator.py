@@ -132,7 +132,13 @@ class DockingEstimator:
         return self._history.nodes
 
     def tick(
-        self, time: float, heading: float | None, rudder: float, shaft_speed: float, fixes: Sequence[UsblFix] = ()
+        self,
+        time: float,
+        heading: float | None,
+        rudder: float,
+        shaft_speed: float,
+        fixes: Sequence[UsblFix] = (),
+        aids: Sequence[Measurement] = (),
     ) -> DockingEstimate:
         """One step of the filter.
 
@@ -142,6 +148,7 @@ class DockingEstimator:
             rudder: Mean rudder angle since the last tick [rad], positive to starboard.
             shaft_speed: Mean shaft speed since the last tick [rad/s].
             fixes: Packets that arrived since the last tick, in any order.
+            aids: What other sensors measured since then, see `aids.Aids`.
 
         Raises:
             ParameterError: The time does not advance, or an input is not a number.
@@ -161,7 +168,7 @@ class DockingEstimator:
             prompt += [replace(m, stamp=time) for m in measurements]
             measurements = []
         history.append(float(time), u, prompt)
-        for measurement in measurements:
+        for measurement in (*aids, *measurements):
             history.insert(measurement)
         return self._estimate(time, history.replay())
 

@@ -1,0 +1,76 @@
+"""Where a vehicle is that hears ranges alone: the first belief, from those of the last seconds and dead reckoning."""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.core.history import Node
+from estimators.core.types import Array
+
+DIRECTIONS = 12  # round a beacon from which the search for the place starts
+STEPS = 12  # of Gauss and Newton
+AMBIGUOUS = 16.0  # by which another place must be less likely, in squared deviations
+CERTAIN = 15.0  # standard deviation of a place that suffices [m]
+CLOSE = 5.0  # distance within which two places are one [m]
+
+
+class Heard(NamedTuple):
+    """A range, as if heard at the start."""
+
+    beacon: Array  # (2,) less how far the vehicle has moved since [m]
+    down: float  # of the beacon from the transponder [m]
+    value: float  # [m]
+    variance: float  # with what the current may have moved the vehicle since [m2]
+
+
+def heard(nodes: Sequence[Node], velocity: Array, drift: float, kind: str) -> list[Heard]:
+    """The ranges of all nodes, as if heard at the last of them.
+
+    Args:
+        nodes: Up to the start.
+        velocity: Through the water (2,) north, east [m/s].
+        drift: Standard deviation of the current [m/s].
+        kind: Of the measurements that are ranges.
+    """
+    now = nodes[-1].time
+    found = []
+    for node in nodes:
+        age = now - node.time
+        for m in node.measurements:
+            if m.kind == kind:
+                north, east, down = m.parameters
+                variance = m.covariance.item() + (drift * age) ** 2
+                found.append(Heard(np.array((north, east)) + velocity * age, down, m.value.item(), variance))
+    return found
+
+
+def place(ranges: Sequence[Heard]) -> tuple[Array, Array] | None:
+    """The one place (2,) that explains the ranges and its covariance (2, 2); None where there is another, or none."""
+    if len({tuple(np.round(r.beacon)) for r in ranges}) < 2:
+        return None
+    first = ranges[-1]
+    reach = math.sqrt(max(first.value**2 - first.down**2, 1.0))
+    angles = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
+    solved = [_solve(ranges, first.beacon + reach * np.array((math.cos(a), math.sin(a)))) for a in angles]
+    cost, best, covariance = min(solved, key=lambda one: one[0])
+    rivals = [c for c, x, _ in solved if np.hypot(*(x - best)) > CLOSE]
+    if min(rivals, default=math.inf) - cost < AMBIGUOUS or math.sqrt(float(np.trace(covariance))) > CERTAIN:
+        return None
+    return best, covariance
+
+
+def _solve(ranges: Sequence[Heard], start: Array) -> tuple[float, Array, Array]:
+    """Cost, place and covariance that Gauss and Newton find from a start."""
+    beacons, x = np.array([r.beacon for r in ranges]), start
+    down, values = np.array([r.down for r in ranges]), np.array([r.value for r in ranges])
+    weights = 1.0 / np.array([r.variance for r in ranges])
+    information, residual = np.eye(2), values
+    for _ in range(STEPS):
+        away = x - beacons
+        distance = np.maximum(np.sqrt(np.sum(away**2, axis=1) + down**2), 1e-3)
+        H, residual = away / distance[:, None], values - distance
+        information = H.T @ (weights[:, None] * H) + 1e-6 * np.eye(2)
+        x = x + np.linalg.solve(information, H.T @ (weights * residual))
+    return float(residual @ (weights * residual)), x, np.linalg.inv(information)
