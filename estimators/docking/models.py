@@ -267,8 +267,14 @@ class PlanarModels:
         found = range_start.place(ranges)
         if found is None:
             return None
-        mean[:2] = found[0]
-        return self._belief(mean, found[1], np.eye(mean.size))
+        mean[:2] = found.position
+        # What a range shows too much has moved the place.
+        onto, names = np.eye(mean.size), self.noise.bias_names
+        for column, one in zip(found.gain.T, ranges, strict=True):
+            for name, factor in ((f"range_{one.source}", 1.0), (f"range_scale_{one.source}", one.value)):
+                if name in names:
+                    onto[:2, 8 + names.index(name)] -= factor * column
+        return self._belief(mean, found.covariance, onto)
 
     def _mean(self, heading: float, node: Node) -> Array:
         """The state at a start with its place still open."""

@@ -19,6 +19,7 @@ CLOSE = 5.0  # distance within which two places are one [m]
 class Heard(NamedTuple):
     """A range, as if heard at the start."""
 
+    source: str
     beacon: Array  # (2,) less how far the vehicle has moved since [m]
     down: float  # of the beacon from the transponder [m]
     value: float  # [m]
@@ -42,35 +43,45 @@ def heard(nodes: Sequence[Node], velocity: Array, drift: float, kind: str) -> li
             if m.kind == kind:
                 north, east, down = m.parameters
                 variance = m.covariance.item() + (drift * age) ** 2
-                found.append(Heard(np.array((north, east)) + velocity * age, down, m.value.item(), variance))
+                found.append(Heard(m.source, np.array((north, east)) + velocity * age, down, m.value.item(), variance))
     return found
 
 
-def place(ranges: Sequence[Heard]) -> tuple[Array, Array] | None:
-    """The one place (2,) that explains the ranges and its covariance (2, 2); None where there is another, or none."""
+class Place(NamedTuple):
+    """Where ranges put the vehicle."""
+
+    cost: float  # squared deviations that are left
+    position: Array  # (2,) north, east [m]
+    covariance: Array  # (2, 2) by the ranges' own noise
+    gain: Array  # (2, k) by which each range moves it
+
+
+def place(ranges: Sequence[Heard]) -> Place | None:
+    """The one place that explains the ranges; None where there is another, or it is not certain enough."""
     if len({tuple(np.round(r.beacon)) for r in ranges}) < 2:
         return None
     first = ranges[-1]
     reach = math.sqrt(max(first.value**2 - first.down**2, 1.0))
     angles = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
     solved = [_solve(ranges, first.beacon + reach * np.array((math.cos(a), math.sin(a)))) for a in angles]
-    cost, best, covariance = min(solved, key=lambda one: one[0])
-    rivals = [c for c, x, _ in solved if np.hypot(*(x - best)) > CLOSE]
-    if min(rivals, default=math.inf) - cost < AMBIGUOUS or math.sqrt(float(np.trace(covariance))) > CERTAIN:
+    best = min(solved, key=lambda one: one.cost)
+    rivals = [one.cost for one in solved if math.dist(one.position, best.position) > CLOSE]
+    if min(rivals, default=math.inf) - best.cost < AMBIGUOUS or math.sqrt(np.trace(best.covariance)) > CERTAIN:
         return None
-    return best, covariance
+    return best
 
 
-def _solve(ranges: Sequence[Heard], start: Array) -> tuple[float, Array, Array]:
-    """Cost, place and covariance that Gauss and Newton find from a start."""
+def _solve(ranges: Sequence[Heard], start: Array) -> Place:
+    """What Gauss and Newton find from a start."""
     beacons, x = np.array([r.beacon for r in ranges]), start
     down, values = np.array([r.down for r in ranges]), np.array([r.value for r in ranges])
     weights = 1.0 / np.array([r.variance for r in ranges])
-    information, residual = np.eye(2), values
+    information, H, residual = np.eye(2), np.zeros((len(ranges), 2)), values
     for _ in range(STEPS):
         away = x - beacons
         distance = np.maximum(np.sqrt(np.sum(away**2, axis=1) + down**2), 1e-3)
         H, residual = away / distance[:, None], values - distance
         information = H.T @ (weights[:, None] * H) + 1e-6 * np.eye(2)
         x = x + np.linalg.solve(information, H.T @ (weights * residual))
-    return float(residual @ (weights * residual)), x, np.linalg.inv(information)
+    covariance = np.linalg.inv(information)
+    return Place(float(residual @ (weights * residual)), x, covariance, covariance @ H.T * weights)
