@@ -62,6 +62,7 @@ class DockingNavigator:
         self._estimator.reset()
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._yaw_rate = 0.0
+        self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
 
     def update(
         self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
@@ -72,6 +73,7 @@ class DockingNavigator:
         for reading in readings:
             if reading.sensor == "compass":
                 headings.append(float(reading.value[0]))
+                self._tilt = (float(reading.value[1]), float(reading.value[2]))
                 stamps.append(reading.stamp)
             elif reading.sensor == "feedback":
                 drives.append(reading.value.tolist())
@@ -93,7 +95,7 @@ class DockingNavigator:
                 [sum(values) / len(drives) for values in zip(*drives, strict=True)]
             )
         depth, origin = self._depth.value or 0.0, (float(self._dock[0]), float(self._dock[1]))
-        more = [m for r in aided.values() for m in measurements(r, self._aids[r.sensor], depth, origin)]
+        more = [m for r in aided.values() for m in measurements(r, self._aids[r.sensor], depth, origin, self._tilt)]
         heading = self._heading_now(time, headings, stamps)
         result = self._estimator.tick(time, heading, rudder, shaft_speed, fixes, more)
         mean = result.mean.copy()

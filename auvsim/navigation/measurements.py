@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from pydantic import Field
 
-from auvsim.base.frames import Array
+from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
 from auvsim.sensors.compass import CompassSettings
@@ -28,7 +28,11 @@ class FixSettings(Settings):
 
 
 def measurements(
-    reading: Reading, settings: Any, depth: float, origin: tuple[float, float] = (0.0, 0.0)
+    reading: Reading,
+    settings: Any,
+    depth: float,
+    origin: tuple[float, float] = (0.0, 0.0),
+    tilt: tuple[float, float] = (0.0, 0.0),
 ) -> Iterator[Measurement]:
     """What a reading says of the horizontal motion; nothing, where its sensor is none that is known here.
 
@@ -39,6 +43,7 @@ def measurements(
         settings: Of its sensor.
         depth: Of the vehicle [m].
         origin: Of the filter's axes, north and east [m].
+        tilt: Pitch and roll of the vehicle [rad], by which what is measured in its axes is levelled.
     """
     value = reading.value
     match settings:
@@ -46,14 +51,18 @@ def measurements(
             yield _measurement(COMPASS, reading, value[:1], math.radians(settings.heading_noise_deg))
         case GyroSettings():
             sigma = math.radians(settings.noise_density_deg) * math.sqrt(settings.rate)
-            yield _measurement(GYRO, reading, value[2:3], sigma)
+            pitch, roll = tilt
+            _, q, r = value.tolist()
+            turn = (q * math.sin(roll) + r * math.cos(roll)) / math.cos(pitch)
+            yield _measurement(GYRO, reading, np.array((turn,)), sigma)
         case DvlSettings():
+            level = rotation(tilt[1], tilt[0], 0.0)[:2]
             for kind, track, sigma in (
-                (BOTTOM, value[:2], settings.bottom_noise),
-                (WATER, value[3:5], settings.water_noise),
+                (BOTTOM, value[:3], settings.bottom_noise),
+                (WATER, value[3:], settings.water_noise),
             ):
                 if not np.isnan(track).all():
-                    yield _measurement(kind, reading, track, *sigma[:2])
+                    yield _measurement(kind, reading, level @ track, *sigma[:2])
         case RangeSettings():
             north, east, down = settings.beacon
             place = (north - origin[0], east - origin[1], down - depth - settings.transponder[2])

@@ -68,6 +68,7 @@ class ReckoningNavigator:
         """Forgets everything."""
         self._estimator.reset()
         self._depth = AlphaBeta(*DEPTH_GAINS)
+        self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
 
     @property
     def nodes(self) -> Sequence[Node[Any]]:
@@ -87,12 +88,14 @@ class ReckoningNavigator:
         """See `Navigator.update`."""
         found: list[Measurement] = []
         for reading in readings:
+            if reading.sensor == "compass":
+                self._tilt = (float(reading.value[1]), float(reading.value[2]))
             if reading.sensor == "depth":
                 self._depth.update(reading.stamp, float(reading.value[0]))
             elif reading.sensor == "usbl":
                 found.append(self._fix(reading))
             elif reading.sensor in self._sensors:
-                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0)
+                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
         result = self._estimator.tick(time, (), found)
         n = len(self._space)
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))

@@ -110,7 +110,9 @@ def _arrivals(signals: Signals) -> Iterator[Arrival]:
         for k, (t, psi) in enumerate(zip(headings.times.tolist(), headings.values.tolist(), strict=True)):
             yield Arrival(Reading("compass", t, t, np.array((wrap(psi), 0.0, 0.0)), k), 0)
     for k, (t, values) in enumerate(_joined(given, TRACKS)):
-        yield Arrival(Reading("dvl", t, t, np.array((*values[:2], math.nan, *values[2:], math.nan)), k), 1)
+        level = np.where(np.isnan(values[1::2]), math.nan, 0.0)  # no table says how fast it sinks
+        value = np.array((*values[:2], level[0], *values[2:], level[1]))
+        yield Arrival(Reading("dvl", t, t, value, k), 1)
     if rates is not None:
         for k, (t, r) in enumerate(zip(rates.times.tolist(), rates.values.tolist(), strict=True)):
             yield Arrival(Reading("gyro", t, t, np.array((0.0, 0.0, r)), k), 2)
