@@ -17,6 +17,7 @@ from auvsim.navigation import aids
 from auvsim.navigation.estimate import PLANAR_STATES, Estimate
 from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 from estimators.core.estimator import StateFilter
@@ -30,6 +31,9 @@ from estimators.docking.usbl import UsblFix, UsblModel
 TURN = 10.0  # mean duration of a turn of the current that the interacting filters expect [s]
 SETTLING = 50.0  # mean time after it for which its memory is kept apart [s]
 DEPTH_GAINS = (0.09, 0.0042)  # of the depth gauge's alpha-beta filter, steady state for 0.05 m and 0.02 m/s2
+# Of the position where a DVL tells the velocity [m2/s]: its errors of scale and mounting are no constants, but turn and
+# grow with the velocity, and the model's surge is not level in a dive. Without it the filter believed itself too much.
+DOPPLER_WALK = 4e-4
 # An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the begin of a turn.
 GROSS = Outliers(prior=0.02, deviations=(15.0,))
 ANY = Outliers(prior=0.03, deviations=(2.0, 15.0))  # where fixes may be wrong by a few metres all the same
@@ -162,6 +166,8 @@ def navigator(
     readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
     biases = {**aids.biases(used, setup.sensors.get("compass")), **base.biases}
     noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings), biases=biases)
+    if of_kind(used, DvlSettings):
+        noise = replace(noise, position=max(noise.position, DOPPLER_WALK))
     white = 0.0 if "dock_heading" in base.biases else math.radians(s.dock_heading_deg)
     model = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=white)
     more = {"aids": aids.assumed(used)} if used else {}
