@@ -117,9 +117,9 @@ class _Settled:
 
 
 def _refined(estimate: Estimate, belief: Gaussian | None, names: list[str]) -> Estimate:
-    """An estimate with the smoothed states in place of its own; as it is where there are none."""
+    """An estimate with the smoothed states in place of its own, where there are any; it decides on no measurement."""
     if belief is None:
-        return estimate
+        return replace(estimate, outcomes=())
     at = {name: float(belief.mean[k]) for k, name in enumerate(names)}
     before = dict(zip(PLANAR_STATES, (*estimate.position[:2], estimate.heading, *estimate.velocity, *estimate.current),
                       strict=True))  # fmt: skip

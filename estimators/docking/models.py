@@ -263,8 +263,8 @@ class PlanarModels:
             return None
         mean = self._mean(heading, nodes[index])
         velocity = mean[3] * np.array((math.cos(heading), math.sin(heading)))
-        ranges = range_start.heard(nodes[: index + 1], velocity, self.noise.initial_current, RANGE)
-        found = range_start.place(ranges)
+        ranges = range_start.heard(nodes[: index + 1], velocity, RANGE)
+        found = range_start.place(ranges, max(self.noise.initial_current, 1e-3))
         if found is None:
             return None
         mean[:2] = found.position

@@ -23,16 +23,16 @@ class Heard(NamedTuple):
     beacon: Array  # (2,) less how far the vehicle has moved since [m]
     down: float  # of the beacon from the transponder [m]
     value: float  # [m]
-    variance: float  # with what the current may have moved the vehicle since [m2]
+    variance: float  # [m2]
+    age: float  # in which the current has moved the vehicle, too [s]
 
 
-def heard(nodes: Sequence[Node], velocity: Array, drift: float, kind: str) -> list[Heard]:
+def heard(nodes: Sequence[Node], velocity: Array, kind: str) -> list[Heard]:
     """The ranges of all nodes, as if heard at the last of them.
 
     Args:
         nodes: Up to the start.
         velocity: Through the water (2,) north, east [m/s].
-        drift: Standard deviation of the current [m/s].
         kind: Of the measurements that are ranges.
     """
     now = nodes[-1].time
@@ -42,8 +42,8 @@ def heard(nodes: Sequence[Node], velocity: Array, drift: float, kind: str) -> li
         for m in node.measurements:
             if m.kind == kind:
                 north, east, down = m.parameters
-                variance = m.covariance.item() + (drift * age) ** 2
-                found.append(Heard(m.source, np.array((north, east)) + velocity * age, down, m.value.item(), variance))
+                beacon = np.array((north, east)) + velocity * age
+                found.append(Heard(m.source, beacon, down, m.value.item(), m.covariance.item(), age))
     return found
 
 
@@ -56,14 +56,19 @@ class Place(NamedTuple):
     gain: Array  # (2, k) by which each range moves it
 
 
-def place(ranges: Sequence[Heard]) -> Place | None:
-    """The one place that explains the ranges; None where there is another, or it is not certain enough."""
+def place(ranges: Sequence[Heard], drift: float) -> Place | None:
+    """The one place that explains the ranges; None where there is another, or it is not certain enough.
+
+    Args:
+        ranges: As if heard now.
+        drift: Standard deviation of the current, each component [m/s].
+    """
     if len({tuple(np.round(r.beacon)) for r in ranges}) < 2:
         return None
     first = ranges[-1]
     reach = math.sqrt(max(first.value**2 - first.down**2, 1.0))
     angles = np.arange(DIRECTIONS) * math.tau / DIRECTIONS
-    solved = [_solve(ranges, first.beacon + reach * np.array((math.cos(a), math.sin(a)))) for a in angles]
+    solved = [_solve(ranges, drift, first.beacon + reach * np.array((math.cos(a), math.sin(a)))) for a in angles]
     best = min(solved, key=lambda one: one.cost)
     rivals = [one.cost for one in solved if math.dist(one.position, best.position) > CLOSE]
     if min(rivals, default=math.inf) - best.cost < AMBIGUOUS or math.sqrt(np.trace(best.covariance)) > CERTAIN:
@@ -71,17 +76,21 @@ def place(ranges: Sequence[Heard]) -> Place | None:
     return best
 
 
-def _solve(ranges: Sequence[Heard], start: Array) -> Place:
-    """What Gauss and Newton find from a start."""
-    beacons, x = np.array([r.beacon for r in ranges]), start
+def _solve(ranges: Sequence[Heard], drift: float, start: Array) -> Place:
+    """What Gauss and Newton find of place and current from a start."""
+    beacons, ages = np.array([r.beacon for r in ranges]), np.array([r.age for r in ranges])[:, None]
     down, values = np.array([r.down for r in ranges]), np.array([r.value for r in ranges])
     weights = 1.0 / np.array([r.variance for r in ranges])
-    information, H, residual = np.eye(2), np.zeros((len(ranges), 2)), values
+    prior = np.diag((1e-6, 1e-6, drift**-2, drift**-2))
+    x = np.array((*start, 0.0, 0.0))
+    information, H, residual = prior, np.zeros((len(ranges), 4)), values
     for _ in range(STEPS):
-        away = x - beacons
+        away = x[:2] - x[2:] * ages - beacons
         distance = np.maximum(np.sqrt(np.sum(away**2, axis=1) + down**2), 1e-3)
-        H, residual = away / distance[:, None], values - distance
-        information = H.T @ (weights[:, None] * H) + 1e-6 * np.eye(2)
-        x = x + np.linalg.solve(information, H.T @ (weights * residual))
+        H = np.hstack((away, -ages * away)) / distance[:, None]
+        residual = values - distance
+        information = H.T @ (weights[:, None] * H) + prior
+        x = x + np.linalg.solve(information, H.T @ (weights * residual) - prior @ (0.0, 0.0, *x[2:]))
     covariance = np.linalg.inv(information)
-    return Place(float(residual @ (weights * residual)), x, covariance, covariance @ H.T * weights)
+    cost = float(residual @ (weights * residual) + x[2:] @ x[2:] / drift**2)
+    return Place(cost, x[:2], covariance[:2, :2], (covariance @ H.T * weights)[:2])
