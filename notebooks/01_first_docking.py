@@ -24,37 +24,39 @@
 import numpy as np
 from IPython.display import Image
 
+from auvsim import load_scenario, read_log, run, summarise
 from auvsim.analysis import plots
-from auvsim.data import log
-from auvsim.missions.docking import metrics
-from auvsim.simulation import sampling, scenario, trial
 
 # %% [markdown]
 # ## One trial
 #
-# A plan is a scenario with distributions in it. Drawing it with a seed gives a definite scenario: start, dock heading and current are this seed's.
+# The default plan is a scenario with distributions in it. Drawn with a seed it is definite: start, dock heading and current are this seed's.
 
 # %%
-plan = sampling.default_plan()
-definite = scenario.parse(sampling.draw(plan, seed=1))
-definite.vehicle.start, definite.dock, definite.current
+definite = load_scenario(seed=1)
+name, settings = definite.lone  # of the only vehicle
+settings.start, definite.structures["dock"], definite.water.current
 
 # %%
-recorded = trial.run_trial(definite, seed=1)
-for time, kind, text in zip(*recorded["event"].values(), strict=True):
+log = run(definite, seed=1, path="trial.nc")
+vehicle = log.vehicle()
+event = vehicle["event"]
+for time, kind, text in zip(event["time"], event["kind"], event["text"], strict=True):
     print(f"{time:7.1f} s  {kind:<10} {text}")
 
 # %% [markdown]
-# The verdict, from the log alone: everything below works as well on a `trial.nc` that somebody sent you (`log.read`).
+# The verdict, from the log alone: everything below works as well on a `trial.nc` that somebody sent you (`read_log`).
 
 # %%
-summary = metrics.summarise(recorded)
-print(f"docked: {summary.docked} after {summary.time:.0f} s, attempt {summary.attempts}")
-print(f"nose off the axis at the mouth: {summary.miss_distance:.2f} m, heading {summary.heading_error_deg:+.1f} deg")
-assert summary.docked
+summary = summarise(vehicle)
+print(f"docked: {summary['docked']} after {summary['time']:.0f} s, attempt {summary['attempts']}")
+print(
+    f"nose off the axis at the mouth: {summary['miss_distance']:.2f} m, heading {summary['heading_error_deg']:+.1f} deg"
+)
+assert summary["docked"]
 
 # %%
-plots.track(recorded, "track.png")
+plots.track(vehicle, "track.png")
 Image("track.png")
 
 # %% [markdown]
@@ -63,21 +65,20 @@ Image("track.png")
 # Bands are two standard deviations of the filter's own covariance. NEES, the squared error over that covariance, should be about 1 per degree of freedom.
 
 # %%
-plots.estimates(recorded, "estimates.png")
+plots.estimates(vehicle, "estimates.png")
 Image("estimates.png")
 
 # %% [markdown]
 # ## Other water
 #
-# Whatever a plan pins is no longer drawn; all else, the noises included, stays as it was for this seed. A current of 0.4 m/s that turns by 90 degrees on
+# Whatever is given is no longer drawn; all else, the noises included, stays as it was for this seed. A current of 0.4 m/s that turns by 90 degrees on
 # the approach:
 
 # %%
 turning = {"kind": "turning", "speed": 0.4, "direction_deg": 30.0, "start": 250.0, "end": 260.0}
-rough = scenario.parse(sampling.draw(sampling.merge(plan, {"current": turning}), seed=1))
-in_turn = trial.run_trial(rough, seed=1)
-verdict = metrics.summarise(in_turn)
-print(f"docked: {verdict.docked} in attempt {verdict.attempts}, after {verdict.time:.0f} s")
+in_turn = run(load_scenario(seed=1, current=turning), seed=1)
+verdict = summarise(in_turn.vehicle())
+print(f"docked: {verdict['docked']} in attempt {verdict['attempts']}, after {verdict['time']:.0f} s")
 
 # %% [markdown]
 # ## Two estimators on the same noise
@@ -87,11 +88,10 @@ print(f"docked: {verdict.docked} in attempt {verdict.attempts}, after {verdict.t
 
 
 # %%
-def position_rms(factory: str, seed: int) -> float:
+def position_rms(kind: str, seed: int) -> float:
     """Rms horizontal position error of an estimator over a trial [m]."""
-    chosen = sampling.merge(plan, {"estimator": {"factory": factory}})
-    result = trial.run_trial(scenario.parse(sampling.draw(chosen, seed)), seed=seed)
-    return metrics.summarise(result).estimate["all"].position_rms
+    result = run(load_scenario(seed=seed, estimator={"kind": kind}), seed=seed)
+    return summarise(result.vehicle())["estimate"]["all"]["position_rms"]
 
 
 errors = np.array([[position_rms(name, seed) for name in ("augmented_ekf", "paper")] for seed in (11, 12, 13)])
@@ -99,8 +99,10 @@ for seed, (augmented, paper) in zip((11, 12, 13), errors, strict=True):
     print(f"seed {seed}: augmented {augmented:.2f} m, paper {paper:.2f} m")
 
 # %% [markdown]
-# Three trials prove nothing: they show how to compare on paired seeds. The log keeps it all.
+# Three trials prove nothing: they show how to compare on paired seeds. The log keeps it all; groups of the vehicle go by their short names
+# (`vehicle["truth"]`, `vehicle["compass"]`), and every variable says its units.
 
 # %%
-log.write(recorded, "trial.nc")
-{group: sorted(variables) for group, variables in recorded.groups.items()}
+again = read_log("trial.nc").vehicle()
+print(again.table("truth")["nu"])
+{group: sorted(again[group]) for group in again.groups}

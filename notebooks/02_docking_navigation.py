@@ -50,9 +50,9 @@ reproduce.show(study)
 # - **Both ingredients are needed.** Without the delay buffer (CUR), without the current (DLY) or without both (REG*), the settled error is 5 to 35 times as
 #   large.
 # - **The current as two states** of the filter (A0) takes all that can be had while the current stays as it is: its error is that of the posterior Cramér-Rao
-#   bound. But it believes the current constant, and when that turns it is lost, and does not know it: see its NEES. Let the current wander (A), and it is as
+#   bound. But it assumes a constant current, and when that turns it is lost, and does not know it: see its NEES. Let the current wander (A), and it is as
 #   good as the paper's filter and no better. An unscented filter (UKF) does what the extended one does: nothing here bends much within its uncertainty.
-# - **Two models at once** (IMM): one believes in a steady current, one in a changing one, and the fixes decide. It is better in calm and turn alike, and
+# - **Two models at once** (IMM): one assumes a steady current, one a changing one, and the fixes decide. It is better in calm and turn alike, and
 #   treats outliers as a third possibility. What it cannot do is tell weak thrust or a skewed compass from a current: there it loses to the paper's filter,
 #   whose cruder current hides any steady error.
 # - **With biases** of speed and compass among its states (IMM+biases) it loses nowhere. Its NEES is below 1 where there are no biases to be found: it allows for
@@ -95,7 +95,7 @@ Image("figure7.png")
 # ## The same on MuJoCo's truth
 #
 # So far vehicle and filters shared one planar model. Now the whole vehicle moves in MuJoCo, under its autopilot, with the sensors of a docking trial, and the filters
-# believe a planar model condensed from it. A few of the rows, three runs each; `auvsim reproduce paper1` has all of them, forty runs each.
+# assume a planar model fitted to it. A few of the rows, three runs each; `auvsim reproduce paper1` has all of them, forty runs each.
 
 # %%
 mujoco = paper1_mujoco.reproduce(seed=0, quick=True)
@@ -106,6 +106,6 @@ files = paper1_truths.write(study, mujoco, Path())
 Image("truths.png")
 
 # %% [markdown]
-# The condensed model costs next to nothing: give the planar truth the same sensors, and every filter errs as it does on MuJoCo's. What changes the order are the
+# The fitted model costs next to nothing: give the planar truth the same sensors, and every filter errs as it does on MuJoCo's. What changes the order are the
 # compasses, each wrong by a constant: a filter without a state for the vehicle's takes that error for a current, and the dock's, which turns all fixes about the
 # dock, hardly anything on board can see, so that it is most of the error that is left and all filters come closer to each other.

@@ -16,7 +16,7 @@
 # %% [markdown]
 # # Identification
 #
-# What a docking filter believes of its vehicle are some thirty coefficients. Tables and strip theory give them to within some ten per cent; a sea trial of five
+# What a docking filter assumes of its vehicle is some thirty coefficients. Tables and strip theory give them to within some ten per cent; a sea trial of five
 # minutes tells more, if it is asked the right questions. This notebook drives manoeuvres, fits the planar model to what was measured, judges it on a
 # manoeuvre that it has not seen, asks what the data could not tell, and docks with the result. In the shell: `auvsim manoeuvre`, `auvsim identify`,
 # `auvsim dock --estimator.model`.
@@ -27,14 +27,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from auvsim import load_scenario, run, summarise
 from auvsim.base.errors import InputError
-from auvsim.data import log
 from auvsim.identification import pictures, product
 from auvsim.identification.pipeline import identify
 from auvsim.identification.readers import read
-from auvsim.missions.docking import metrics
 from auvsim.physics import planar_sets
-from auvsim.simulation import sampling, scenario, trial
+from auvsim.simulation import sampling, scenario
 
 # %% [markdown]
 # ## Manoeuvres
@@ -49,7 +48,7 @@ def drive(kind: str, duration: float) -> Path:
     """The log of a manoeuvre of the MuJoCo vehicle."""
     plan = sampling.merge(sampling.manoeuvre_plan(kind), {"manoeuvre": {"kind": kind, "duration": duration}})
     path = Path(f"{kind}.nc")
-    log.write(trial.run_trial(scenario.parse(sampling.draw(plan, seed=3)), seed=3), path)
+    run(scenario.parse(sampling.draw(plan, seed=3)), seed=3, path=path)
     return path
 
 
@@ -62,7 +61,7 @@ for record in (*fitted.records, *held_out.records):
     )
 
 # %% [markdown]
-# The reader takes a user's CSV or NetCDF just as well, whatever its columns are called, and says what it cannot believe. A rudder in degrees, called radians:
+# The reader takes a user's CSV or NetCDF just as well, whatever its columns are called, and says what cannot be right. A rudder in degrees, called radians:
 
 # %%
 rows = ["time [s],rudder [rad],n [rpm],heading [deg]"]
@@ -77,8 +76,8 @@ except InputError as error:
 # ## The fit
 #
 # Three steps. Least squares of smoothed velocities; then segments of some seconds, each from a first state of its own, so that no error of the model grows; then
-# the likelihood of a filter's own innovations, which bears what the model lacks as noise of the process. It starts from the model condensed from the vehicle's
-# hydrodynamics, which is good already.
+# the likelihood of a filter's own innovations, which bears what the model lacks as noise of the process. It starts from the model fitted to the vehicle's
+# hydrodynamics in MuJoCo, which is good already.
 
 # %%
 found = identify(fitted, held_out)
@@ -132,16 +131,15 @@ figure
 # %% [markdown]
 # ## Docking with it
 #
-# A parameter file holds values, units, intervals, and where they came from. An estimator believes it by name or path.
+# A parameter file holds values, units, intervals, and where they came from. An estimator uses it by name or path.
 
 # %%
 planar_sets.write(product.planar_set(found), Path("lake.yaml"))
 for model in ("condense", "lake.yaml"):
-    plan = sampling.merge(sampling.default_plan(), {"estimator": {"model": model}})
-    summary = metrics.summarise(trial.run_trial(scenario.parse(sampling.draw(plan, seed=3)), seed=3))
-    rms = summary.estimate["all"].position_rms
-    print(f"{model:<10} docked: {summary.docked}, position of the estimate {rms:.2f} m rms")
+    summary = summarise(run(load_scenario(seed=3, estimator={"model": model}), seed=3).vehicle())
+    rms = summary["estimate"]["all"]["position_rms"]
+    print(f"{model:<10} docked: {summary['docked']}, position of the estimate {rms:.2f} m rms")
 
 # %% [markdown]
-# One trial proves nothing, and the condensed model is good: `auvsim study identified_docking lake.yaml` runs a hundred with each model, and with a
+# One trial proves nothing, and the fitted model is good: `auvsim study identified_docking lake.yaml` runs a hundred with each model, and with a
 # third one that is wrong by a fifth.

@@ -25,9 +25,9 @@ from pathlib import Path
 import numpy as np
 from IPython.display import IFrame
 
+from auvsim import run, summarise
 from auvsim.campaign import execution, local, plan, report, statistics, table
-from auvsim.missions.docking import metrics
-from auvsim.simulation import scenario, trial
+from auvsim.simulation import scenario
 
 # %% [markdown]
 # ## The plan
@@ -102,10 +102,9 @@ for nees in statistics.consistency(rows, chosen.variants, chosen.layout):
 
 # %%
 worst = max(rows, key=lambda row: row["miss_distance"] or 0.0)
-again = trial.run_trial(
-    scenario.parse(chosen.values(worst["variant"], worst["trial"])), seed=worst["seed"], trial=worst["trial"]
-)
-same = metrics.summarise(again).miss_distance == worst["miss_distance"]
+definite = scenario.parse(chosen.values(worst["variant"], worst["trial"]))
+again = run(definite, seed=worst["seed"], trial=worst["trial"])
+same = summarise(again.vehicle())["miss_distance"] == worst["miss_distance"]
 print(worst["command"])
 print(f"the same to the last bit: {same}")
 

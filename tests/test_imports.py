@@ -52,7 +52,8 @@ def allowed(module: str, imported: str) -> bool:
         return (part not in ORDER and part in ("", "__version__")) or (
             part in ORDER and ORDER.index(part) <= ORDER.index(name)
         )
-    # The package itself chooses the renderer; run as a program, it is the command.
+    # The package itself chooses the renderer. What else it offers it imports by name when it is first used, so that
+    # `import auvsim` stays fast and MuJoCo is imported after that choice. Run as a program, it is the command.
     return imported == ("auvsim.cli.main" if name == "__main__" else "auvsim.base.renderer.choose_renderer")
 
 

@@ -35,7 +35,7 @@ class AcousticSettings(Settings):
 
 
 class Channel:
-    """A queue of messages on their way to one receiver; each takes 5 uniforms, whether it is lost or not."""
+    """A queue of messages in transit to one receiver; each takes 5 uniforms, whether it is lost or not."""
 
     def __init__(self, settings: AcousticSettings, generator: Generator) -> None:
         self._settings = settings
@@ -44,7 +44,7 @@ class Channel:
         self._count = 0  # breaks ties of arrival in the order sent
 
     def send(self, message: Message, slant_range: float, *, lost: bool = False) -> Fate:
-        """Sends a message over a distance [m]; `lost` marks what was never there to send."""
+        """Sends a message over a distance [m]; `lost`: never sent, being out of reach."""
         settings, to = self._settings, message.destination or ""
         drop, jitter, late, twice, gap = self._noise.uniforms(5)
         if lost:

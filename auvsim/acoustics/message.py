@@ -1,4 +1,4 @@
-"""Messages between modems, and what becomes of them."""
+"""Messages between modems, and their fates."""
 
 from typing import Any, NamedTuple
 
@@ -6,7 +6,7 @@ from auvsim.base.reading import Reading
 
 
 class Message(NamedTuple):
-    """What one modem sends."""
+    """A message that one modem sends."""
 
     source: str  # who sends: a vehicle or structure, by name
     destination: str | None  # to whom; None: to all that hear it
@@ -24,7 +24,7 @@ class UsblPacket(NamedTuple):
 
 
 class Delivery(NamedTuple):
-    """A message that arrived, and what the receiver's modem measured of it."""
+    """A message that arrived, with the range and bearing that the receiver's modem measured."""
 
     message: Message
     received: float  # [s]
@@ -33,7 +33,7 @@ class Delivery(NamedTuple):
 
 
 class Fate(NamedTuple):
-    """What becomes of a message on its way to one receiver, for the log."""
+    """Fate of a message to one receiver, for the log."""
 
     message: Message
     destination: str

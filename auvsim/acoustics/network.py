@@ -12,7 +12,7 @@ class Link(Protocol):
     """What carries messages to one receiver."""
 
     def send(self, message: Message, slant_range: float, *, lost: bool = False) -> Fate:
-        """Takes a message over a distance [m]; `lost` marks what was never there to send."""
+        """Takes a message over a distance [m]; `lost`: never sent, being out of reach."""
         ...
 
     def receive(self, now: float) -> list[Delivery]:
@@ -21,7 +21,7 @@ class Link(Protocol):
 
 
 class Ping(Protocol):
-    """What a service hands to the network."""
+    """A message of a service, handed to the network."""
 
     @property
     def message(self) -> Message:
@@ -40,12 +40,12 @@ class Ping(Protocol):
 
 
 class Service(Protocol):
-    """Something that sends to a vehicle by itself, such as a dock's USBL."""
+    """A sender that acts by itself, such as a dock's USBL."""
 
     vehicle: str  # name of the one that it serves
 
     def poll(self, previous: Truth, now: Truth) -> Iterable[Ping]:
-        """What is sent between two consecutive truths of the vehicle."""
+        """Messages sent between two consecutive true states of the vehicle."""
         ...
 
 

@@ -1,1 +1,1 @@
-"""The ground that every package stands on: errors, settings, files, frames, random streams."""
+"""What every package uses: errors, settings, files, frames, random streams."""

@@ -6,7 +6,7 @@ from auvsim.base.frames import wrap
 
 
 class AlphaBeta:
-    """Value and rate of a quantity that is measured again and again.
+    """Estimates the value and rate of a quantity from repeated measurements.
 
     Args:
         alpha: gain of the value [-].
@@ -43,5 +43,5 @@ class AlphaBeta:
         self.stamp = stamp
 
     def at(self, time: float) -> float | None:
-        """The value at a time [s], carried on at the last rate; None before the first measurement."""
+        """The value at a time [s], extrapolated at the last rate; None before the first measurement."""
         return None if self.value is None else self.value + self.rate * (time - self.stamp)

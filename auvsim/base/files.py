@@ -1,4 +1,4 @@
-"""Files that are whole or absent: written under another name, renamed when done."""
+"""Writes files whole or not at all: under a temporary name, renamed when done."""
 
 import os
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The only sign flips between the user's frames and MuJoCo's.
+"""Frames and angles, and the only conversions between the user's axes and MuJoCo's.
 
 The user sees NED (north, east, down) and a forward-starboard-down body. MuJoCo's world is z-up with x north and
 y west, its bodies are forward-port-up. Both are turned by half a turn about x, so one matrix serves world and body.

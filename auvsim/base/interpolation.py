@@ -1,4 +1,4 @@
-"""The cubic Hermite polynomial: between two samples of a value and its slope, once continuously differentiable."""
+"""Cubic Hermite interpolation between two samples of a value and its slope; once continuously differentiable."""
 
 
 def cubic_hermite(

@@ -1,4 +1,4 @@
-"""Random streams that do not disturb each other, and cheap floats drawn from them.
+"""Independent random streams, one per noise source, and cheap floats drawn from them.
 
 Each noise source owns one stream, named `vehicle/sensor`. Adding a source, or losing a reading, changes no other
 stream; changing the size of a noise changes no draw, because draws are standard and scaled afterwards.

@@ -1,4 +1,4 @@
-"""The one shape in which anything measured on board or received reaches navigation, control and the log."""
+"""A reading: the form in which anything measured or received reaches navigation, control and the log."""
 
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ class Reading(NamedTuple):  # a frozen dataclass takes three times as long to ma
     |          | dock depth [m]                                                                           |
     | dvl      | (6,) u, v, w over ground, then through the water [m/s]; NaN where that track is lost     |
     | gyro     | (3,) p, q, r [rad/s]                                                                     |
+    | range    | (1,) slant range to a beacon [m]                                                         |
     """
 
     sensor: str

@@ -1,4 +1,4 @@
-"""Which OpenGL MuJoCo is to draw with; imports no MuJoCo, which decides when it is first imported."""
+"""Choice of the OpenGL with which MuJoCo draws, made before MuJoCo is first imported."""
 
 import ctypes
 import os
@@ -18,9 +18,9 @@ def loads(library: str) -> bool:
 def choose_renderer(
     environment: MutableMapping[str, str] = os.environ, available: Callable[[str], bool] = loads
 ) -> None:
-    """Lets MuJoCo draw without a display where it can, and look for none where it cannot.
+    """Makes MuJoCo draw without a display where the libraries for that are there, and switches drawing off elsewhere.
 
-    Leaves alone what the user chose, desktops, and systems other than Linux.
+    Does nothing where the user chose a renderer, on desktops, and on systems other than Linux.
     """
     if environment.get("MUJOCO_GL") or environment.get("DISPLAY") or not sys.platform.startswith("linux"):
         return

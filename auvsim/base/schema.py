@@ -1,4 +1,4 @@
-"""What a class of settings says of itself: its dotted keys, its errors in one line, its text as commented YAML."""
+"""Dotted keys of a settings class, its errors in one line, and its text as commented YAML."""
 
 from collections.abc import Iterator, Mapping
 from difflib import get_close_matches
@@ -31,7 +31,7 @@ class UnknownKeyError(ValueError):
 
 
 def members(annotation: Any) -> list[type[BaseModel]]:
-    """The settings classes an annotation allows: several for a union told apart by `kind`, none for plain values.
+    """The settings classes an annotation allows: several for a union discriminated by `kind`, none for plain values.
 
     Of a mapping of names to settings, those of its values.
     """
@@ -45,7 +45,7 @@ def members(annotation: Any) -> list[type[BaseModel]]:
 
 
 def member(annotation: Any, value: Any) -> type[BaseModel] | None:
-    """The one settings class that `value` is meant for, if that can be told."""
+    """The one settings class that `value` is meant for, if there is only one."""
     models = [] if get_origin(annotation) is dict else members(annotation)
     if len(models) > 1 and isinstance(value, Mapping):
         kind = value.get("kind", models[0].model_fields["kind"].default)
@@ -67,7 +67,7 @@ def keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 
 
 def suggestion(key: str, model: type[BaseModel], siblings: list[str]) -> str:
-    """What the unknown dotted `key` may have meant: a like one beside it, or the same name elsewhere."""
+    """What the unknown dotted `key` may have meant: a similar one beside it, or the same name elsewhere."""
     *above, name = key.split(".")
     near = [".".join([*above, close]) for close in get_close_matches(name, siblings, n=1)]
     if not near:

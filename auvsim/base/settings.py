@@ -1,4 +1,4 @@
-"""The base of every module's settings: frozen, strict, documented field by field; and choices among them by `kind`."""
+"""Base class of all settings: frozen, strict, documented field by field; and choice among several by `kind`."""
 
 from collections.abc import Callable
 from typing import Any, get_args
@@ -7,7 +7,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 
 class Settings(BaseModel):
-    """Scenario data owned by one module.
+    """Part of a scenario, defined by the module that uses it.
 
     A field's `description` (with its unit) becomes the comment beside it in the printed default scenario.
     Unknown keys, NaN and infinities are refused. Angles are degrees in keys that end in `_deg`, shaft speeds
@@ -21,7 +21,9 @@ class OwnPart(Settings):
     """A part of the user's own, by the name of its class or factory."""
 
     kind: str = Field(pattern=r"^[\w.]+:\w+$", description="package.module:Name, also found in the working folder")
-    settings: dict[str, Any] = Field(default={}, description="free; handed to it, checked by its class `Settings`")
+    settings: dict[str, Any] = Field(
+        default={}, description="free mapping, checked by the part's class `Settings` if it has one"
+    )
 
 
 def kinds(model: type[BaseModel]) -> tuple[str, ...]:
@@ -30,7 +32,7 @@ def kinds(model: type[BaseModel]) -> tuple[str, ...]:
     return tuple(str(kind) for kind in get_args(field.annotation)) if field else ()
 
 
-def tell(*models: type[BaseModel]) -> Callable[[Any], str]:
+def tag_by_kind(*models: type[BaseModel]) -> Callable[[Any], str]:
     """A discriminator of pydantic: the name of the class that values are meant for, the first if no kind is given.
 
     Each class of the union carries its own name as its `Tag`.

@@ -1,4 +1,4 @@
-"""YAML as scenarios, plans and parameter sets are written: the core schema of YAML 1.2, errors of one line.
+"""Reads and writes YAML by the core schema of YAML 1.2, with the line of every key and errors of one line.
 
 PyYAML follows YAML 1.1, where `1e-4` is a string, `010` is eight, `1:30` ninety and `no` false. Here numbers are
 numbers, only `true` and `false` are truth values, and a key given twice is refused.

@@ -37,7 +37,11 @@ class Stop(Settings):
 class PlanSettings(Settings):
     """A campaign: the same trials with each of several variants of a scenario."""
 
-    name: str = Field(default="campaign", description="what the report calls it")
+    name: str = Field(
+        default="campaign",
+        pattern=r"^[^./\\:\x00-\x1f][^/\\:\x00-\x1f]{0,99}$",
+        description="what the report and its folder in out/ call it; a name, not a path",
+    )
     seed: int = Field(default=0, ge=0, description="seed of every random number of every trial")
     trials: int = Field(default=100, ge=1, description="trials of each variant; at most, if there is a `stop`")
     stop: Stop | None = Field(default=None, description="when to stop earlier")

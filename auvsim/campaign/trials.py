@@ -3,7 +3,6 @@
 import json
 import os
 import platform
-import re
 import time
 import traceback
 from collections.abc import Mapping, Sequence
@@ -22,7 +21,6 @@ from auvsim.simulation import scenario
 
 WARM_UP = 30.0  # simulated time in which all is called, and so compiled, that a whole trial calls [s]
 ENDS = ("timeout", "diverged")  # kinds of event that end a run
-ADDRESS = re.compile(r"0x[0-9a-fA-F]{6,}")  # of an object in memory: other in every process
 
 
 def run(task: Task) -> Result:
@@ -174,7 +172,7 @@ def _simulate(values: Mapping, seed: int, trial: int, duration: float | None = N
 
 def _same_each_time(text: str) -> str:
     """Text of an error without what is of one process only, and fit for any file."""
-    return ADDRESS.sub("0x...", text).encode(errors="replace").decode()
+    return plugins.same_each_time(text).encode(errors="replace").decode()
 
 
 def _at(values: Any, key: str) -> Any:

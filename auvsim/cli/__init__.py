@@ -11,6 +11,7 @@ import tyro
 
 from auvsim import __version__
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.base.neighbours import check_estimators
 from auvsim.cli.parsing import parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
@@ -26,7 +27,7 @@ class Dock:
     """
 
     scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """What to pin, as YAML."""
+    """Keys that are not drawn from the seed, as YAML."""
     seed: int = 0
     """Seed of every random number."""
     trial: int = 0
@@ -63,8 +64,8 @@ class Run:
 class Manoeuvre:
     """Runs manoeuvres of the vehicle, for its identification: KIND.nc and KIND.png each.
 
-    KIND is straight, circle, zigzag, multisine, prbs, spiral, optimal (designed to tell most of the vehicle), or table
-    and sequence, which need a file or an option that says of what. Any key of the scenario is an option too, such as
+    KIND is straight, circle, zigzag, multisine, prbs, spiral, optimal (designed to be most informative), or table
+    and sequence, which need a file or an option for their contents. Any key of the scenario is an option too, such as
     `--manoeuvre.heading_deg 20`.
     """
 
@@ -115,7 +116,7 @@ class ScenarioText:
     """Prints the full scenario as commented YAML: the default one, or what a file and options make of it."""
 
     scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """What to pin, as YAML."""
+    """Keys that are not drawn from the seed, as YAML."""
     default: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The default scenario as installed."""
 
@@ -124,7 +125,7 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    Prints the study with what it is to reach, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
     figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
     gives the same numbers, on however many cores.
     """
@@ -140,7 +141,7 @@ class Reproduce:
     jobs: int | None = None
     """Processes; by default one for each core."""
     truth: Literal["planar", "mujoco", "both"] | None = None
-    """Whose motion is true: that of the paper's planar model, of the vehicle in MuJoCo, or one study of each; by
+    """True motion: of the paper's planar model, of the vehicle in MuJoCo, or one study of each; by
     default both, and in --quick planar."""
 
 
@@ -192,9 +193,9 @@ class Identify:
     out: Path = Path("out")
     """Folder of parameters.yaml, report.html and report.png."""
     holdout: tuple[Path, ...] = ()
-    """Logs to judge by; by default the kind of manoeuvre that teaches least."""
+    """Logs to judge by; by default the least informative kind of manoeuvre."""
     columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
-    """Which column is what, where names do not say: `rudder: {column: d, unit: deg, sign: -1}`."""
+    """Meaning of columns, where their names do not say it: `rudder: {column: d, unit: deg, sign: -1}`."""
     vehicle: str = "remus100"
     """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit starts."""
     name: str | None = None
@@ -238,7 +239,7 @@ class Estimate:
 
 @dataclass(frozen=True, kw_only=True)
 class Study:
-    """Runs a study behind the figures of the README; without a name lists them."""
+    """Runs one of the studies behind the figures of the README; without a name lists them."""
 
 
 Command = (
@@ -279,6 +280,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(arguments: list[str]) -> int:
+    check_estimators()
     if arguments[:1] == ["study"]:  # each study has options of its own
         from auvsim.cli import study
 
@@ -308,8 +310,9 @@ def _run(arguments: list[str]) -> int:
 
     if isinstance(command, Run):
         from auvsim.cli import options, run
+        from auvsim.simulation.loading import find
 
-        path = run.find(command.scenario)
+        path = find(command.scenario)
         scenario = options.scenario(path, None, values, command.seed, command.trial)
         return run.run(
             scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
@@ -382,4 +385,4 @@ def _run(arguments: list[str]) -> int:
             return products.again(command.log, products.show_summary)
 
 
-_DESCRIPTION = "Closed-loop docking trials of autonomous underwater vehicles. `auvsim --version` prints the version."
+_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles. `auvsim --version` prints the version."

@@ -7,7 +7,7 @@ from typing import Any, get_type_hints
 
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
-from auvsim.simulation import sampling
+from auvsim.simulation import loading, sampling
 from auvsim.simulation.scenario import Scenario, Start, parse
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.simulation.short import ShortScenario
@@ -16,7 +16,7 @@ PLACE = "command line"
 
 
 def split(arguments: list[str], command: type) -> tuple[list[str], dict]:
-    """Parts the command's own arguments from the keys of the scenario, which become nested values.
+    """Separates the command's own arguments from the keys of the scenario, which become nested values.
 
     `--current.speed 0.2` and `--current.speed=0.2` are keys; the value is YAML. Hyphens stand for underscores.
 
@@ -77,16 +77,12 @@ def scenario_text(path: Path | None, default: bool, values: Mapping) -> str:
 def _plan(
     path: Path | None, values: Mapping, estimator: str | None, base: Mapping | None = None
 ) -> tuple[dict, dict[str, str]]:
-    pinned, places = ({}, {}) if path is None else sampling.load_plan(path)
     if estimator is not None:
         values = sampling.merge({"estimator": {"kind": estimator}}, values)
-    if "vehicles" in pinned:
-        if "estimator" in values:
-            raise InputError(f"{PLACE}: the scenario names its vehicles; give --vehicles.NAME.estimator.kind")
-        plan = pinned
-    else:
-        plan = sampling.merge(sampling.default_plan() if base is None else dict(base), pinned)
-    return sampling.merge(plan, values), {**places, **dict.fromkeys(_paths(values), PLACE)}
+    plan, places = loading.plan_of(path, values, base)
+    if "vehicles" in plan and "estimator" in values:
+        raise InputError(f"{PLACE}: the scenario names its vehicles; give --vehicles.NAME.estimator.kind")
+    return plan, {**places, **dict.fromkeys(_paths(values), PLACE)}
 
 
 def _check(key: str, name: str, own: list[str]) -> None:

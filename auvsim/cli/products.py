@@ -60,8 +60,11 @@ def still(log: Log, folder: Path, *, path: Path, time: float | None = None, came
     """Draws one picture, wherever it is to be.
 
     Raises:
+        InputError: It is no PNG.
         DrawingError: Without OpenGL.
     """
+    if path.suffix.lower() != ".png":
+        raise InputError(f"command line: --still {path}: the picture is a PNG; give a name that ends in .png")
     from auvsim import video
 
     video.still(log, path, time, cameras=cameras)

@@ -11,7 +11,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvsim.base import plugins
+from auvsim.base.errors import InputError
 from auvsim.missions.manoeuvres.metrics import LABELS, Figures
+from auvsim.missions.registry import find
 
 if TYPE_CHECKING:
     from auvsim.identification.excitation import Outcome
@@ -173,9 +176,10 @@ def show(summary: Mapping[str, Any]) -> None:
     several = summary.get("vehicles")
     vehicles: Mapping[str, Mapping[str, Any]] = several or {"": summary}
     missions = {str(values["mission"]) for values in vehicles.values()}
-    title = f"{missions.pop()} trial" if len(missions) == 1 else "run"
+    rows = {key: label for kind in sorted(missions) for key, label in _of_its_own(kind).items()} | ROWS
+    title = f"{missions.pop().rpartition(':')[2]} trial" if len(missions) == 1 else "run"
     table = Table("", *vehicles, title=title, show_header=bool(several))
-    for key, label in ROWS.items():
+    for key, label in rows.items():
         if any(values.get(key) is not None for values in vehicles.values()):
             table.add_row(label, *(_text(values.get(key)) for values in vehicles.values()))
     phases = dict.fromkeys(phase for values in vehicles.values() for phase in values["estimate"])
@@ -184,6 +188,17 @@ def show(summary: Mapping[str, Any]) -> None:
         cells = (_errors(values["estimate"].get(phase)) for values in vehicles.values())
         table.add_row(f"position rms [m], NEES per degree of freedom, {where}", *cells)
     Console(markup=False).print(table)  # units stand in brackets
+
+
+def _of_its_own(kind: str) -> dict[str, str]:
+    """Labels of the metrics that a mission of the user's own declares, by their keys; of a shipped one none."""
+    if not plugins.is_own(kind):
+        return {}
+    try:
+        columns = find(kind).columns  # pyright: ignore[reportFunctionMemberAccess]
+    except (InputError, AttributeError):  # its class is not here any more, or declares none
+        return {}
+    return {key: f"{m.meaning} [{m.units}]" if m.units not in ("", "1") else m.meaning for key, m in columns.items()}
 
 
 def _errors(quality: Mapping[str, Any] | None) -> str:
@@ -202,7 +217,7 @@ def manoeuvres(found: Sequence[Figures]) -> None:
 
 
 def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", room: float) -> None:
-    """Prints what manoeuvres of one duration would tell of parameters as one table, a column each."""
+    """Prints the information of manoeuvres of one duration on the parameters as one table, a column each."""
     table = Table("", title="expected standard deviation of each parameter [% of its value]")
     for name in outcomes:
         table.add_column(name, justify="right")

@@ -6,33 +6,15 @@ from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
 
-import auvsim
 from auvsim.base.errors import InputError
 from auvsim.cli import products, report
 from auvsim.data.log import Log
 from auvsim.simulation.scenario import Scenario
 
-SHIPPED = Path(auvsim.__file__).parent / "scenarios"
 LOG = "trial.nc"
 PRODUCTS = ("summary.json", "track.png", "estimates.png", "fleet.png", *products.VIDEOS)  # made from it
 COMPILING = "compiling {} (this once; later runs find the code in the cache)"
 WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
-
-
-def find(name: str) -> Path:
-    """The file of a scenario: a YAML file, or a shipped one by name.
-
-    Raises:
-        InputError: there is none.
-    """
-    path = Path(name)
-    if path.suffix in (".yaml", ".yml"):
-        return path
-    shipped = SHIPPED / f"{name}.yaml"
-    if not shipped.is_file():
-        known = ", ".join(sorted(found.stem for found in SHIPPED.glob("*.yaml"))) or "none"
-        raise InputError(f"no scenario '{name}': no .yaml file, and none that is shipped ({known})")
-    return shipped
 
 
 def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, name: str = "docking") -> int:

@@ -19,16 +19,16 @@ class Setpoints(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class ControllerSetup:
-    """What a controller is made from."""
+    """The set-up that a controller is made from."""
 
-    settings: Any  # of its class; of a user's own what stands under `settings`
+    settings: Any  # an instance of its settings class; for a user's own, what stands under `settings`
     actuation: Actuation  # of its vehicle
     shaft_speed: Callable[[float], float]  # shaft speed [rad/s] that holds a speed through the water >= 0 [m/s]
     period: float  # time between two commands [s]
 
 
 class Controller(Protocol):
-    """Turns setpoints into demands, from what the sensors on board say; made by `Class(setup)`."""
+    """Turns setpoints into demands by the readings of the sensors on board; made by `Class(setup)`."""
 
     @property
     def heading(self) -> float | None:

@@ -1,4 +1,4 @@
-"""The controllers by their kinds."""
+"""Registry of the controllers by kind."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +8,7 @@ from pydantic import Discriminator, Tag
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
-from auvsim.base.settings import OwnPart, tell
+from auvsim.base.settings import OwnPart, tag_by_kind
 from auvsim.control.controller import Controller, ControllerSetup
 from auvsim.control.torpedo import Autopilot, AutopilotSettings
 
@@ -19,7 +19,7 @@ class OwnController(OwnPart):
 
 ControlSettings = Annotated[
     Annotated[AutopilotSettings, Tag("AutopilotSettings")] | Annotated[OwnController, Tag("OwnController")],
-    Discriminator(tell(AutopilotSettings, OwnController)),
+    Discriminator(tag_by_kind(AutopilotSettings, OwnController)),
 ]
 CONTROLLERS: dict[str, Callable[[ControllerSetup], Any]] = {"torpedo": Autopilot}
 
@@ -35,8 +35,10 @@ def build(kind: str, setup: ControllerSetup) -> Controller:
         where = f"controller '{kind}': settings"
         setup = replace(setup, settings=plugins.settings_of(made, setup.settings.settings, where))
     try:
-        return made(setup)
+        part = made(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"controller '{kind}' cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"controller '{kind}'", part, "observe", "command", "heading", "depth")
+    return part

@@ -78,7 +78,7 @@ class Autopilot:
         return self._depth.value
 
     def command(self, setpoints: Setpoints) -> Commands:
-        """The demand now; a rudder that is given is taken as it is, and the heading left alone."""
+        """The demand now; a rudder among the setpoints is passed on as it is, in place of heading control."""
         heading, depth, speed, rudder = setpoints
         s, shaft_speed = self._settings, self._shaft_speed(speed)
         previous = speed if self._speed is None else self._speed
@@ -89,7 +89,7 @@ class Autopilot:
         error = depth - self._depth.value
         wanted = -(s.depth_gain * error + s.depth_integral_gain * self._integral)
         pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
-        # Positive stern plane dives. The integral stands still while pitch is limited or the vehicle is far off.
+        # Positive stern plane dives. The integral is frozen while pitch is limited or the depth error is large.
         elevator = s.pitch_gain * (self._pitch.value - pitch) + s.pitch_rate_gain * self._pitch.rate
         if abs(error) < 0.5 and pitch == wanted:
             self._integral += error * self._period

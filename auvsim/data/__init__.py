@@ -1,1 +1,1 @@
-"""What a run leaves: the log, its file format, and what records it."""
+"""Data: the log of a run, its file format and its recorder."""

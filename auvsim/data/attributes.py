@@ -1,4 +1,4 @@
-"""Attributes of a log: what it says of the run, of each vehicle and of each structure."""
+"""Attributes of a log: of the run, of each vehicle and of each structure."""
 
 import math
 from collections.abc import Mapping

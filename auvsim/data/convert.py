@@ -66,7 +66,7 @@ def converted(found: Content, where: str) -> Content:
 
 
 class _Old:
-    """A log of format 1 or 2 on its way."""
+    """A log of format 1 or 2 during its conversion."""
 
     def __init__(self, found: Content, where: str) -> None:
         self.found, self.where = found, where

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from auvsim.data.attributes import RUN_ATTRIBUTES, STRUCTURE_ATTRIBUTES, VEHICLE_ATTRIBUTES, AttributeSpec
-from auvsim.data.variables import READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table
+from auvsim.data.variables import OPTIONAL_TABLES, READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table
 
 INTRODUCTION = """\
 # Log format 3
@@ -15,10 +15,12 @@ along its last axis, separated by commas) and `flag_values` with `flag_meanings`
 
 ```python
 import xarray
+
 truth = xarray.open_dataset("trial.nc", group="vehicles/remus100/truth")
 
 from auvsim.data.log import read
-vehicle = read("trial.nc").vehicle()   # of the only vehicle; vehicle("auv_1") of one among several
+
+vehicle = read("trial.nc").vehicle()  # of the only vehicle; vehicle("auv_1") of one among several
 vehicle["truth"]["position"], vehicle["compass"]["value"], vehicle.phases
 ```
 
@@ -43,6 +45,8 @@ def table_markdown(tables: Mapping[str, Table] | None = None) -> str:
     lines += _table("Group `vehicles/<name>/sensors/<sensor>`, with `value` and the sensor's own variables", READING)
     for name, table in ROOT_TABLES.items():
         lines += _table(f"Group `{name}`", table)
+    for name, table in OPTIONAL_TABLES.items():
+        lines += _table(f"Group `{name}`, which earlier logs lack", table)
     for heading, table in (tables or {}).items():
         lines += _table(heading, table)
     return "\n".join(lines)

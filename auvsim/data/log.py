@@ -1,7 +1,4 @@
-"""The log of a run: groups of arrays that describe themselves, in one NetCDF-4 file that is whole or absent.
-
-`python -m auvsim.data.log` prints the format.
-"""
+"""The log of a run: groups of arrays that describe themselves, in one NetCDF-4 file that is whole or absent."""
 
 import os
 from dataclasses import dataclass
@@ -14,7 +11,6 @@ from auvsim.base.errors import InputError
 from auvsim.data import convert, netcdf
 from auvsim.data.attributes import VERSIONS, WALL_TIME
 from auvsim.data.checks import check
-from auvsim.data.description import table_markdown
 from auvsim.data.fields import content, parts
 from auvsim.data.variables import Variable
 
@@ -232,7 +228,3 @@ def _number(attributes: Attributes, name: str, path: str, default: float | None)
         return float(value)
     wrong = "not given" if value is None else f"{value!r}, no number"
     raise InputError(f"attribute '{name}' of '{path}' is {wrong}; there are {', '.join(attributes)}")
-
-
-if __name__ == "__main__":
-    print(table_markdown())

@@ -1,4 +1,4 @@
-"""Keeps what happens in a run, cheaply, until it becomes a Log; the log of a long run grows on disk."""
+"""Records a run at little cost; the log of a long run grows on disk."""
 
 import importlib.metadata
 import math

@@ -1,4 +1,4 @@
-"""A NetCDF-4 log that grows while a run goes on, and stands under its name only when it is whole."""
+"""A NetCDF-4 log that grows during a run and gets its name only when it is complete."""
 
 import contextlib
 import io

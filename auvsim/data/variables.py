@@ -1,4 +1,4 @@
-"""Variables of a log: what each group holds, said once; sensors, missions, vehicles and estimators add their own.
+"""Variables of a log: the tables of its groups, to which sensors, missions, vehicles and estimators add their own.
 
 A group of a log is a table of variables that share the axis `time`. The tables of this file hold for every vehicle;
 `vehicle_groups` completes them by what one vehicle's parts say of themselves.
@@ -150,6 +150,14 @@ MESSAGES: Table = {
     "fate": Variable((), "category", "", "delivered, or why not"),
 }
 
+MODELS: Table = {  # a row for each model of the run; logs may lack the group
+    **TIME,
+    "kind": Variable((), "category", "", "vehicle or structure"),
+    "model": Variable((), "str", "", "its name or path, as the scenario has it"),
+    "sha256": Variable((), "str", "", "of the text"),
+    "text": Variable((), "str", "", "its MJCF file when the run began"),
+}
+
 VEHICLE_TABLES: Mapping[str, Table] = {  # groups that every vehicle has, by their names below it
     "truth": TRUTH,
     "estimate": ESTIMATE,
@@ -159,6 +167,7 @@ VEHICLE_TABLES: Mapping[str, Table] = {  # groups that every vehicle has, by the
     "contact": CONTACT,
 }
 ROOT_TABLES: Mapping[str, Table] = {"event": EVENT, "network/messages": MESSAGES}
+OPTIONAL_TABLES: Mapping[str, Table] = {"models": MODELS}
 
 
 def sensor_table(variables: Table) -> Table:
@@ -214,4 +223,4 @@ def vehicle_groups(
 def run_groups(vehicles: Mapping[str, Mapping[str, Group]]) -> dict[str, Group]:
     """Groups of a whole run by path, of each vehicle's groups (by its name) and of the run itself."""
     own = {f"vehicles/{name}/{path}": group for name, groups in vehicles.items() for path, group in groups.items()}
-    return own | {path: Group(table) for path, table in ROOT_TABLES.items()}
+    return own | {path: Group(table) for path, table in {**ROOT_TABLES, **OPTIONAL_TABLES}.items()}

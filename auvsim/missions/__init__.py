@@ -1,1 +1,1 @@
-"""Missions: from an estimate to setpoints, with their phases, log variables and metrics."""
+"""Missions: setpoints from the estimate, with phases, log variables and metrics."""

@@ -23,7 +23,7 @@ class Event(NamedTuple):
 
 
 class Situation(NamedTuple):
-    """What a vehicle knows when its mission decides."""
+    """What a mission may decide by: time, estimate, smoothed heading and depth, latch, readings, messages."""
 
     time: float  # [s]
     estimate: Estimate | None  # the last one, or None before there is any
@@ -36,7 +36,7 @@ class Situation(NamedTuple):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Place:
-    """A structure as it is charted."""
+    """A charted structure: its name, pose and dimensions."""
 
     name: str
     pose: StructurePose
@@ -45,10 +45,10 @@ class Place:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class MissionSetup:
-    """What a mission is made from."""
+    """The set-up that a mission is made from."""
 
     name: str  # of the vehicle
-    settings: Any  # of its class; of a user's own what stands under `settings`
+    settings: Any  # an instance of its settings class; for a user's own, what stands under `settings`
     vehicle: Vehicle
     heading: float  # at the start [rad]
     depth: float  # at the start [m]
@@ -60,7 +60,7 @@ class MissionSetup:
 
 
 class Metric(NamedTuple):
-    """One of the plain values that a mission is judged by; a column of a campaign's table."""
+    """A metric of a mission; also a column of a campaign's table."""
 
     dtype: str  # str, bool, int or float
     units: str
@@ -71,23 +71,23 @@ class Mission:
     """A mission; made by `Class(setup)`.
 
     A subclass sets `phases`, keeps `phase` (the index of the present one) and `finished` up to date, appends to
-    `events`, and implements `update`; the rest has defaults that suit a mission of its own.
+    `events`, and implements `update`. All else has defaults, which it may override.
     """
 
     phases: ClassVar[tuple[str, ...]]  # names of the phases, as logged
-    variables: ClassVar[Table] = {}  # what `row` gives at each update, for the log
-    columns: ClassVar[Mapping[str, Metric]] = {}  # what `metrics` gives
-    aftermath: ClassVar[float] = 0.0  # how long a run goes on after its end, so that this can be seen [s]
+    variables: ClassVar[Table] = {}  # variables logged at each update, in the order of `row`
+    columns: ClassVar[Mapping[str, Metric]] = {}  # metrics that `metrics` returns
+    aftermath: ClassVar[float] = 0.0  # time that is still simulated after its end [s]
 
     def __init__(self, setup: MissionSetup) -> None:
         self.phase = 0
         self.finished = False
         self.events: list[Event] = []
-        self.dock: Place | None = None  # the structure that it is about, if any
+        self.dock: Place | None = None  # the structure at which it ends, if any
 
     @property
     def at_rest(self) -> bool:
-        """Whether the vehicle is held fast, so that nothing is to be estimated."""
+        """Whether a latch holds the vehicle, so that nothing is estimated."""
         return False
 
     @property
@@ -104,10 +104,10 @@ class Mission:
         return ()
 
     def overdue(self, duration: float) -> str:
-        """What the log says when the time limit [s] of the run ends it."""
+        """Text of the event that is logged when the time limit [s] ends the run first."""
         return f"not finished within {duration:g} s"
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
-        """What this kind of mission is judged by: the values of `columns`, by name."""
+        """Metrics of a vehicle's log: the values of `columns`, by name."""
         return {}

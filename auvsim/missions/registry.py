@@ -1,4 +1,4 @@
-"""The missions by their kinds, and what a scenario may say of each."""
+"""Registry of the missions by kind, and the settings of each."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -8,7 +8,7 @@ from pydantic import Discriminator, Tag
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
-from auvsim.base.settings import OwnPart, tell
+from auvsim.base.settings import OwnPart, tag_by_kind
 from auvsim.missions.docking.guidance import Docking, DockingSettings
 from auvsim.missions.manoeuvres.mission import Manoeuvre
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
@@ -25,7 +25,7 @@ MissionSettings = Annotated[
     | Annotated[ManoeuvreMissionSettings, Tag("ManoeuvreMissionSettings")]
     | Annotated[TrackSettings, Tag("TrackSettings")]
     | Annotated[OwnMission, Tag("OwnMission")],
-    Discriminator(tell(DockingSettings, ManoeuvreMissionSettings, TrackSettings, OwnMission)),
+    Discriminator(tag_by_kind(DockingSettings, ManoeuvreMissionSettings, TrackSettings, OwnMission)),
 ]
 MISSIONS: dict[str, type[Mission]] = {"docking": Docking, "manoeuvre": Manoeuvre, "track": Track}
 
@@ -49,8 +49,10 @@ def build(kind: str, setup: MissionSetup) -> Mission:
     if plugins.is_own(kind):
         setup = replace(setup, settings=plugins.settings_of(made, setup.settings.settings, f"mission '{kind}'"))
     try:
-        return made(setup)
+        part = made(setup)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"mission '{kind}' cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"mission '{kind}'", part, "phases", "phase", "variables", "finished", "events", "update", "row")
+    return part

@@ -1,4 +1,4 @@
-"""The estimators of `estimators.docking` behind the contract of a run: from readings to what their filters take."""
+"""Adapters of the docking estimators to the contract of a run: readings in, estimates out."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -34,7 +34,7 @@ DEPTH_GAINS = (0.09, 0.0042)  # of the depth gauge's alpha-beta filter, steady s
 # Of the position where a DVL tells the velocity [m2/s]: its errors of scale and mounting are no constants, but turn and
 # grow with the velocity, and the model's surge is not level in a dive. Without it the filter believed itself too much.
 DOPPLER_WALK = 4e-4
-# An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the begin of a turn.
+# An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the start of a turn.
 GROSS = Outliers(prior=0.02, deviations=(15.0,))
 ANY = Outliers(prior=0.03, deviations=(2.0, 15.0))  # where fixes may be wrong by a few metres all the same
 
@@ -223,8 +223,8 @@ def imm_biased(setup: NavigatorSetup) -> Navigator:
 def _interacting(setup: NavigatorSetup, biases: Mapping[str, Bias], outliers: Outliers) -> Navigator:
     """Three modes: steady, turning, and steady again after a turn.
 
-    What the turning mode does not know must not leak into the steady one, so that it is believed for long before. Only
-    then is the steady mode's covariance mixed with one that has long converged.
+    The third mode keeps the large covariance of a turn out of the steady mode: after a turn, a filter stays in it long
+    enough to converge, so that the steady mode's covariance is only ever mixed with one that has converged.
     """
     s = setup.settings
     noise = _noise(s)

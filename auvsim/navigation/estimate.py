@@ -1,4 +1,4 @@
-"""What an estimator says: named states with their covariance, views of them, and the fates of measurements."""
+"""An estimate: named states with covariance, the views that control and plots use, outcomes of measurements."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -26,7 +26,7 @@ PLANAR_STATES: Mapping[str, str] = MappingProxyType(
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Estimate:
-    """What the vehicle knows of itself at one instant; NED from the datum."""
+    """Estimated state of a vehicle at one instant, in NED from the datum."""
 
     time: float  # [s]
     position: Array  # (3,) north, east, depth of the body origin [m]
@@ -38,8 +38,8 @@ class Estimate:
     mean: Array | None = None  # (n,) of the states; None: the eight planar ones, as the views say
     refused: int = 0  # measurements refused so far
     reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
-    reinitialised: int = 0  # how often it had to start anew, because its numbers were no longer finite
-    outcomes: tuple[Outcome, ...] = ()  # what became of the measurements decided since the last estimate
+    reinitialised: int = 0  # number of restarts after its numbers were no longer finite
+    outcomes: tuple[Outcome, ...] = ()  # of the measurements accepted or refused since the last estimate
 
     @property
     def state(self) -> Array:

@@ -1,4 +1,4 @@
-"""The contract of an estimator in a run, and what one is made from."""
+"""The contract of an estimator in a run, and the set-up that it is made from."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ from estimators.planar.model import PlanarParameters
 
 
 class Navigator(Protocol):
-    """An estimator behind the contract of a run."""
+    """An estimator in a run."""
 
     states: Mapping[str, str]  # units of the estimated states by name, in their order; north and east first
 
@@ -62,7 +62,7 @@ class Buffered(Protocol):
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class NavigatorSetup:
-    """What a vehicle may know before it starts; never what its sensors drew."""
+    """What an estimator may know before the start; never the errors that its sensors drew."""
 
     vehicle: str  # its name
     settings: Any  # of the estimator; of a user's own, its class `Settings` or what stands under `settings`
@@ -71,7 +71,7 @@ class NavigatorSetup:
     period: float  # time between two updates [s]
     rates: Mapping[str, float]  # of the sensors that the vehicle has, by name [Hz]
     usbl: UsblSettings  # lever arms of the dock's USBL
-    dock: StructurePose | None = None  # where the dock is charted whose USBL serves it
+    dock: StructurePose | None = None  # charted pose of the mission's dock
     sensors: Mapping[str, Any] = field(default_factory=dict)  # settings of those on board by name: data sheets, places
 
 

@@ -1,6 +1,8 @@
-"""The estimators by their kinds, and how one is made for a vehicle."""
+"""Registry of the estimators by kind."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 from auvsim.base import plugins
@@ -44,7 +46,14 @@ def build(setup: NavigatorSetup) -> Navigator:
         raise
     except Exception as error:  # a user's factory may fail in any way
         raise InputError(f"estimator '{kind}' cannot be made: {type(error).__name__}: {error}") from error
-    for needed in ("update", "reset", "states"):
-        if not hasattr(navigator, needed):
-            raise InputError(f"estimator '{kind}' made a {type(navigator).__name__} without {needed}; see Navigator")
+    plugins.require(f"estimator '{kind}'", navigator, "update", "reset", "states")
+    states = navigator.states
+    if (
+        not isinstance(states, Mapping)
+        or len(states) < 2
+        or not all(isinstance(n, str) for n in chain(*states.items()))
+    ):
+        raise InputError(
+            f"estimator '{kind}': states is {states!r}, not units by name of two states or more, north first"
+        )
     return navigator

@@ -1,10 +1,10 @@
-"""What a scenario says of an estimator: its kind, and what it assumes of the noises."""
+"""Settings of the estimators by kind: the noise and the model that each assumes."""
 
 from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag
 
-from auvsim.base.settings import OwnPart, Settings, tell
+from auvsim.base.settings import OwnPart, Settings, tag_by_kind
 
 
 class _Assumed(Settings):
@@ -23,8 +23,8 @@ class PaperSettings(_Assumed):
     """Paper 1's filter and its halves, with the noises that the paper recommends."""
 
     kind: Literal["paper", "current_only", "delay_only", "regular_ekf"] = "paper"
-    compass_deg: float = Field(default=1.0, gt=0, description="compass noise it assumes, each reading [deg]")
-    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+    compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="assumed error of the dock's compass, sd [deg]")
 
 
 class AugmentedSettings(_Assumed):
@@ -35,7 +35,7 @@ class AugmentedSettings(_Assumed):
         description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, "
         "dead_reckoning, or package.module:factory",
     )
-    compass_deg: float = Field(default=1.0, gt=0, description="compass noise it assumes, each reading [deg]")
+    compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
     heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
     velocity_noise: float = Field(default=1e-4, ge=0, description="process noise of surge and sway [m2/s3]")
@@ -43,9 +43,9 @@ class AugmentedSettings(_Assumed):
     current_noise: float = Field(
         default=3e-6, ge=0, description="random walk of the current [m2/s3]; 3e-3 in turns without imm"
     )
-    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="assumed error of the dock's compass, sd [deg]")
     dock_heading_state: bool = Field(
-        default=True, description="whether that error is constant, and estimated, instead of new with each fix"
+        default=True, description="whether that error is a constant, which is estimated, or white noise of each fix"
     )
     use: tuple[Literal["gyro", "dvl", "range"], ...] = Field(
         default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass, depth and USBL"
@@ -62,9 +62,9 @@ class InteractingSettings(AugmentedSettings):
     turning_noise: float = Field(
         default=0.02, ge=0, description="random walk of the current while it turns, in the imm [m2/s3]"
     )
-    turn_interval: float = Field(default=300.0, gt=0, description="mean time between turns the imm expects [s]")
+    turn_interval: float = Field(default=300.0, gt=0, description="mean time between turns that the imm assumes [s]")
     compass_bias_deg: float = Field(
-        default=0.5, ge=0, description="constant error of the vehicle's compass that the imm estimates [deg]"
+        default=0.5, ge=0, description="assumed compass bias, which the imm estimates, sd [deg]"
     )
 
 
@@ -88,5 +88,5 @@ EstimatorSettings = Annotated[
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
-    Discriminator(tell(AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, OwnEstimator)),
+    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, OwnEstimator)),
 ]

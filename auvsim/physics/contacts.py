@@ -1,4 +1,4 @@
-"""Contacts of vehicles: with what, and how hard, tick by tick."""
+"""Contacts of vehicles: what they touch, and with what force, tick by tick."""
 
 import math
 from collections.abc import Iterable

@@ -7,13 +7,13 @@ integrators, each Runge-Kutta stage) uses the sum, so added mass is exact in fre
 
 With v_r the hull's velocity relative to the water, omega its angular velocity, G the gradient of the water's velocity
 and a_c = Dv_c/Dt, `-M_A d(nu_r)/dt` is `-M_A J qacc` (in M) plus
-`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull meets other water as it moves. A gradient also takes
+`M_A [a_c + G v_r + omega x v_r - (d(J)/dt qvel); 0]`: the hull enters other water as it moves. A gradient also takes
 `G' p` from the force, p being the linear part of the impulse `M_A nu_r` (Galper & Miloh 1995, J. Fluid Mech. 295), and
 the water's own pressure adds `rho V a_c` at the centre of buoyancy. Force and moment are then those of the kinetic
 energy `nu_r' M_A nu_r / 2`, exact in irrotational strain but for moments of the order of M_A G^2. In rotational shear
 they are an approximation, which has the lift coefficient of a sphere, 1/2 (Auton, Hunt & Prud'homme 1988).
 
-The water is a local expansion in `mjData.userdata`, one slot a vehicle (see `water_slot`). Where it has a surface,
+The water is a local expansion in `mjData.userdata`, one slot per vehicle (see `water_slot`). Where it has a surface,
 buoyancy is that of the strips under water; the other forces of a hull, and its added mass, fade with the share of its
 volume that is under water, those of fins, propellers and thrusters with the share of their area. What a breaking
 surface adds (slamming, ventilation, waves made) is left out.
@@ -130,7 +130,7 @@ def _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent,
         p0 += q * (cdof[d + 3] + cdof[d + 1] * a2 - cdof[d + 2] * a1)
         p1 += q * (cdof[d + 4] + cdof[d + 2] * a0 - cdof[d] * a2)
         p2 += q * (cdof[d + 5] + cdof[d] * a1 - cdof[d + 1] * a0)
-    # Change of the water's velocity along the hull's way, dv/dt + (x_dot . grad) v = Dv/Dt + (v_r . grad) v.
+    # Change of the water's velocity along the hull's path, dv/dt + (x_dot . grad) v = Dv/Dt + (v_r . grad) v.
     h0 = b0 + (water[g] * u0 + water[g + 1] * u1 + water[g + 2] * u2)
     h1 = b1 + (water[g + 3] * u0 + water[g + 4] * u1 + water[g + 5] * u2)
     h2 = b2 + (water[g + 6] * u0 + water[g + 7] * u1 + water[g + 8] * u2)

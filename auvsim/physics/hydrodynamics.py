@@ -186,7 +186,7 @@ def _check_model(model: mujoco.MjModel, elements: list[Body]) -> None:
         raise InputError("option density and viscosity must be 0: MuJoCo's own fluid model would act as well")
     if model.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_SLEEP):
         raise InputError(
-            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would pile up"
+            "the sleep flag must be off: the inertia of a sleeping body is not rebuilt, so added mass would accumulate"
         )
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)

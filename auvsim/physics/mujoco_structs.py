@@ -1,4 +1,4 @@
-"""Where the fields of MuJoCo's C structs are, from the introspection that ships with MuJoCo, verified before use."""
+"""Offsets of the fields of MuJoCo's C structs, from MuJoCo's own introspection, verified before use."""
 
 import ctypes
 from functools import cache

@@ -1,14 +1,15 @@
-"""Condenses a vehicle's hydrodynamics to the planar rudder-driven model that estimators believe, and says how well."""
+"""Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics; gives the fit's error."""
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
 from auvsim.base.errors import InputError
-from auvsim.base.frames import Array
+from auvsim.base.frames import FLIP6, Array
 from auvsim.physics import hydrodynamics
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
@@ -19,7 +20,7 @@ _SAMPLES = 600
 
 @dataclass(frozen=True, kw_only=True)
 class PlanarFit:
-    """A planar model of a vehicle near one speed, with its error against the vehicle it came from."""
+    """A planar model of a vehicle near one speed, with its error relative to the vehicle to which it was fitted."""
 
     vehicle: str
     speed: float  # [m/s]
@@ -41,22 +42,32 @@ class PlanarFit:
         return (-b + math.sqrt(max(b * b - 4 * p.X_nn * c, 0.0))) / (2 * p.X_nn)
 
 
-class _Level:
-    """Planar forces and inertia of a vehicle that is level, in still water, straight from MuJoCo."""
+class Level:
+    """Forces and inertia of a vehicle that is level, in still water, straight from MuJoCo.
+
+    Raises:
+        InputError: the vehicle cannot be used; the text says why.
+    """
 
     def __init__(self, name: str, density: float) -> None:
         vehicle = library.vehicle(name)
         body = vehicle.root.find("body", "hull")
         body.add("freejoint")
-        self.model = mujoco.MjModel.from_xml_string(vehicle.root.to_xml_string(), vehicle.root.get_assets())
-        hydrodynamics.equip(self.model, density)
+        try:
+            self.model = mujoco.MjModel.from_xml_string(vehicle.root.to_xml_string(), vehicle.root.get_assets())
+            hydrodynamics.equip(self.model, density)
+        except (ValueError, InputError) as error:
+            raise InputError(f"model {name}: {' '.join(str(error).split())[:300]}") from None
         self.data = mujoco.MjData(self.model)
         fins = [self.model.actuator(fin).trnid[0] for fin in vehicle.actuation.fins]
         self._fins = [int(self.model.jnt_qposadr[joint]) for joint in fins]
         self._shaft = int(self.model.jnt_dofadr[self.model.actuator("shaft").trnid[0]])
         self.actuation = vehicle.actuation
-        hull = next(b for b in hydrodynamics.bodies(self.model) if b.kind == "hull")
+        hull = next((b for b in hydrodynamics.bodies(self.model) if b.kind == "hull"), None)
+        if hull is None:
+            raise InputError(f"model {name}: the body 'hull' has no numerics such as 'hull_added_mass'")
         self.added_mass = hull.fields["added_mass"]
+        self.volume = float(hull.fields["displaced_volume"][0])  # [m3]
         mujoco.mj_forward(self.model, self.data)
         full = np.zeros((self.model.nv, self.model.nv))
         mujoco.mj_fullM(self.model, self.data, full)
@@ -66,20 +77,27 @@ class _Level:
 
     def evaluate(self, u: float, v: float, r: float, rudder: float, shaft_speed: float) -> Array:
         """X, Y, N (3,) [N, N, N m] that act on the accelerations of a planar motion, SNAME signs."""
-        data = self.data
-        data.qpos[: self.model.nq] = self.model.qpos0
-        for at, angle in zip(self._fins, self.actuation.allocate(Commands(rudder, 0.0, 0.0))[:-1], strict=True):
-            data.qpos[at] = angle
-        data.qvel[:] = 0.0
-        data.qvel[0], data.qvel[1], data.qvel[5] = u, -v, -r
-        data.qvel[self._shaft] = shaft_speed
-        mujoco.mj_forward(self.model, data)
-        force = data.qfrc_passive - data.qfrc_bias
+        force = self._forward(u, v, r, Commands(rudder, 0.0, shaft_speed))
         # MuJoCo's linear accelerations are the world's; the body's components turn with it.
         return np.array([force[0], -force[1], -force[5]]) - self.inertia @ (-v * r, u * r, 0.0)
 
+    def forces(self, u: float, *, rudder: float = 0.0, elevator: float = 0.0, shaft_speed: float = 0.0) -> Array:
+        """Force and moment (6,) on a vehicle that moves straight ahead [N, N m], forward-starboard-down."""
+        return FLIP6 * self._forward(u, 0.0, 0.0, Commands(rudder, elevator, shaft_speed))[:6]
 
-@cache
+    def _forward(self, u: float, v: float, r: float, demand: Commands) -> Array:
+        """Generalised force (nv,), gravity included, in MuJoCo's axes."""
+        data = self.data
+        data.qpos[: self.model.nq] = self.model.qpos0
+        for at, angle in zip(self._fins, self.actuation.allocate(demand)[:-1], strict=True):
+            data.qpos[at] = angle
+        data.qvel[:] = 0.0
+        data.qvel[0], data.qvel[1], data.qvel[5] = u, -v, -r
+        data.qvel[self._shaft] = demand.shaft_speed
+        mujoco.mj_forward(self.model, data)
+        return data.qfrc_passive - data.qfrc_bias
+
+
 def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.SEA_WATER) -> PlanarFit:
     """Fits the planar model to the forces of a level vehicle near a speed (linear least squares, no trajectories).
 
@@ -95,8 +113,14 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
         InputError: the speed is not positive, or the vehicle cannot reach it.
     """
     if not 0.0 < speed < 20.0:
-        raise InputError(f"cannot condense '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
-    level = _Level(vehicle, density)
+        raise InputError(f"no planar model of '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
+    return _fit_model(vehicle, *library.source("vehicle", vehicle), speed, density)
+
+
+@lru_cache(maxsize=64)
+def _fit_model(vehicle: str, path: Path, text: str, speed: float, density: float) -> PlanarFit:
+    """The fit of a vehicle; its file and text are keys of the cache."""
+    level = Level(vehicle, density)
     shaft = _steady_shaft(level, vehicle, speed)
     generator = np.random.default_rng(0)
     draws = generator.uniform(-1.0, 1.0, (_SAMPLES, 5))
@@ -120,7 +144,7 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
     )
 
 
-def _steady_shaft(level: _Level, vehicle: str, speed: float) -> float:
+def _steady_shaft(level: Level, vehicle: str, speed: float) -> float:
     """Shaft speed [rad/s] at which thrust equals drag straight ahead (bisection: thrust grows with shaft speed)."""
     low, high = 0.0, 1000.0
     if level.evaluate(speed, 0.0, 0.0, 0.0, high)[0] < 0.0:
@@ -145,7 +169,7 @@ def _steady_turn(p: PlanarParameters, rudder: Array, speed: float) -> tuple[Arra
     return np.clip(drift, -0.3, 0.3), np.clip(rate, -0.3, 0.3)
 
 
-def _slopes(level: _Level, speed: float, shaft_speed: float) -> Array:
+def _slopes(level: Level, speed: float, shaft_speed: float) -> Array:
     """Derivatives (2, 3) of Y and N by u v, u r and u^2 rudder on a straight course: lift, Munk moment, fins."""
     step = 1e-3
     slopes = []
@@ -157,7 +181,7 @@ def _slopes(level: _Level, speed: float, shaft_speed: float) -> Array:
 
 
 def _fit(
-    level: _Level, speed: float, u: Array, v: Array, r: Array, rudder: Array, n: Array
+    level: Level, speed: float, u: Array, v: Array, r: Array, rudder: Array, n: Array
 ) -> tuple[PlanarParameters, Array, Array]:
     """Fits the model's terms to X, Y, N; residual and scale as accelerations (3,).
 

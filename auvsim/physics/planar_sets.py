@@ -1,4 +1,4 @@
-"""Sets of the planar model's parameters as files, and which of them an estimator believes.
+"""Files of planar model parameters, and which of them an estimator assumes.
 
 A vehicle's own sets are `models/<vehicle>/planar/<name>.yaml`; any other is given by its path. A set says of each
 parameter its value, unit and interval, and of itself where it came from.
@@ -20,7 +20,7 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
 
-CONDENSE = "condense"  # the model of that name is no set: it is condensed from the vehicle
+CONDENSE = "condense"  # names no file but the model that is fitted to the vehicle
 SUFFIX = ".yaml"
 UNITS = {
     "m": "kg", "x_g": "m", "I_z": "kg m2",
@@ -54,7 +54,7 @@ class HoldOut(Settings):
 
     record: str
     seconds: float = Field(description="length of each prediction [s]")
-    share: float = Field(ge=0, description="error of the position at its end by the distance run, rms [-]")
+    share: float = Field(ge=0, description="error of the position at its end relative to the distance run, rms [-]")
     start_share: float = Field(ge=0, description="the same of the parameters from which the fit started [-]")
 
 
@@ -168,7 +168,7 @@ def find(name: str, vehicle: str) -> Path:
 
 
 def load(name: str, vehicle: str) -> PlanarParameters:
-    """The parameters of a set, by its name among the vehicle's or by its path.
+    """Reads the parameters of a set, by its name among the vehicle's or by its path.
 
     Raises:
         InputError: There is no such set, it cannot be read, or it is another vehicle's.
@@ -178,14 +178,41 @@ def load(name: str, vehicle: str) -> PlanarParameters:
     wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
     if found.vehicle != wanted:
         raise InputError(f"{path}: these are parameters of '{found.vehicle}', not of '{wanted}'")
-    return found.planar()
+    parameters = found.planar()
+    _check(parameters, path)
+    return parameters
+
+
+def _check(p: PlanarParameters, path: Path) -> None:
+    """Sees that a vehicle of these parameters has inertia in every direction and is slowed by its drag.
+
+    Raises:
+        InputError: It has not; the text names the parameter or the sum at fault.
+    """
+    positive = {
+        "m": p.m,
+        "I_z": p.I_z,
+        "m - X_ud": p.m - p.X_ud,
+        "m - Y_vd": p.m - p.Y_vd,
+        "I_z - N_rd": p.I_z - p.N_rd,
+    }
+    for name, value in positive.items():
+        if not value > 0.0:
+            raise InputError(f"{path}: parameters: {name} is {value:g}; it must be above 0")
+    coupled = (p.m * p.x_g - p.Y_rd) * (p.m * p.x_g - p.N_vd)
+    if not (p.m - p.Y_vd) * (p.I_z - p.N_rd) > coupled:
+        sum_of = "m, x_g, I_z, Y_vd, Y_rd, N_vd, N_rd"
+        raise InputError(f"{path}: parameters: the inertia in sway and yaw ({sum_of}) is not positive definite")
+    for name, value in (("X_uu", p.X_uu), ("X_u", p.X_u)):
+        if value > 0.0:
+            raise InputError(f"{path}: parameters: {name} is {value:g}; drag is negative here")
 
 
 def assumed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:
-    """The parameters of the planar model that an estimator assumes.
+    """Returns the planar model that an estimator assumes.
 
     Args:
-        model: `condense`, or a set by name or path.
+        model: `condense` for the model fitted to the vehicle, or a set by name or path.
         vehicle: Name in models/, or the path of an MJCF file.
         speed: Through the water, at which the model is fitted to the vehicle [m/s].
         density: Of the water [kg/m3].

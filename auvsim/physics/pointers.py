@@ -1,4 +1,4 @@
-"""Memory by its address in compiled code, for a callback that is handed bare C pointers.
+"""Access to memory by address in compiled code, for a callback that receives bare C pointers.
 
 Functions for `numba`, to be called by compiled ones only; an address is a pointer-sized integer.
 """

@@ -1,4 +1,4 @@
-"""The look of the scene: light, water and sea floor; nothing here touches physics but the height of the floor."""
+"""Appearance of the scene: light, water and sea floor; only the height of the floor matters to physics."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Compiled scenes of vehicles and structures, quickly: composed once for each fleet, then only moved and turned.
+"""Compiled scenes of vehicles and structures: composed once for each fleet, then only moved and turned.
 
 To compose a scene with PyMJCF takes a ninth of a whole trial, to move its structures and compile it again 5 ms. The
 compiled model is the same bit for bit.
@@ -18,7 +18,7 @@ from pydantic import Field
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, euler_to_quaternion, flip, flip_quaternion
 from auvsim.base.settings import Settings
-from auvsim.physics import hydrodynamics, scenery
+from auvsim.physics import hydrodynamics, scenery, soundness
 from auvsim.physics.fluid import WATER
 from auvsim.physics.forces import RECORD
 from auvsim.physics.truth import StructurePose
@@ -71,6 +71,8 @@ def scene(
         InputError: a name or model cannot be used, or MuJoCo refuses the scene.
     """
     poses = {name: pose for name, (_, pose) in structures.items()}
+    for model in fleet.values():
+        soundness.check(model, settings.water_density)
     composed = _composed(
         tuple((name, model, *library.source("vehicle", model)) for name, model in fleet.items()),
         tuple((name, model, *library.source("structure", model)) for name, (model, _) in structures.items()),
@@ -78,6 +80,8 @@ def scene(
         settings,  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
         rate,
     )
+    for name, pose in poses.items():
+        _check_depth(name, composed.structures[name], pose, settings)
     spec = composed.spec.copy()
     spec.stat.center = _center(poses.values(), settings)
     for name, pose in poses.items():
@@ -213,6 +217,16 @@ def _center(poses: Any, settings: WorldSettings) -> Array:
     """Middle (3,) of the structures in MuJoCo's world; of the water column where there are none."""
     places = [_place(pose)[0] for pose in poses]
     return np.mean(places, axis=0) if places else np.array([0.0, 0.0, -0.5 * settings.sea_floor])
+
+
+def _check_depth(name: str, structure: library.Structure, pose: StructurePose, settings: WorldSettings) -> None:
+    """Sees that the mouth of a structure is in the water as a whole."""
+    radius, floor = structure.mouth_radius, settings.sea_floor
+    if not radius <= pose.depth <= floor - radius:
+        raise InputError(
+            f"structure '{name}': a mouth of radius {radius:g} m at a depth of {pose.depth:g} m is not wholly between "
+            f"the surface and the sea floor at {floor:g} m; give a depth between {radius:g} and {floor - radius:g} m"
+        )
 
 
 def _pillar_name(structure: str) -> str:

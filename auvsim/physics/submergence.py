@@ -1,4 +1,4 @@
-"""How much of a hull, fin, propeller or thruster is under the surface, as compiled functions."""
+"""Submerged part of a hull, fin, propeller or thruster, as compiled functions."""
 
 import math
 

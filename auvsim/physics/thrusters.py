@@ -10,7 +10,7 @@ def channel(model: mujoco.MjModel, name: str) -> int:
     """Where the command of a thruster is, as its record holds it.
 
     Raises:
-        InputError: it has no actuator of its name, or one that pushes by itself.
+        InputError: it has no actuator of its name, or its actuator exerts a force of its own.
     """
     index = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_ACTUATOR, name)
     if index < 0:

@@ -1,4 +1,4 @@
-"""What a world says of its vehicles and structures: the state that sensors measure and logs keep."""
+"""True states of vehicles and structures: what sensors measure and logs keep."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""The water as the compiled code reads it: its layout in `mjData.userdata`, one slot a vehicle.
+"""The water as the compiled code reads it: its layout in `mjData.userdata`, one slot per vehicle.
 
 A slot is a local expansion about a time and a place, in MuJoCo's world axes. A reset zeroes it: still water without
 end. Above the surface, if there is one, there is no water.

@@ -1,4 +1,4 @@
-"""The physical world: steps MuJoCo with n vehicles and n structures in the water, owns their state, gives `Truth`."""
+"""The physical world: n vehicles and n structures in the water, stepped by MuJoCo; gives their true states."""
 
 from collections.abc import Sequence
 from itertools import combinations
@@ -20,7 +20,7 @@ from auvsim.water.currents import CurrentField
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
 NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
-LOOKOUT = 0.25  # longest time between two looks at these distances [s]
+LOOKOUT = 0.25  # longest time between two checks of these distances [s]
 
 
 class StructureState:
@@ -43,6 +43,10 @@ class StructureState:
     def latched(self) -> str | None:
         """Name of the vehicle that its latch holds."""
         return next((name for name, latch in self._latches.items() if self._active[latch]), None)
+
+    def holds(self, vehicle: str) -> bool:
+        """Whether its latch holds a vehicle."""
+        return bool(self._active[self._latches[vehicle]])
 
     def hold(self, vehicle: str) -> None:
         """Closes the latch on a vehicle."""
@@ -120,7 +124,10 @@ class World:
 
     def latched(self, vehicle: str) -> str | None:
         """Name of the structure whose latch holds a vehicle."""
-        return next((name for name, state in self.structures.items() if state.latched == vehicle), None)
+        for name, state in self.structures.items():
+            if state.holds(vehicle):
+                return name
+        return None
 
     def reset(self) -> None:
         """Back to time zero: no contact, all latches open, and every vehicle waiting for its place."""

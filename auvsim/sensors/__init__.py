@@ -1,1 +1,1 @@
-"""Sensors on board: one sensor a file."""
+"""Sensors on board, one per file."""

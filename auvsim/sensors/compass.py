@@ -18,7 +18,7 @@ from auvsim.sensors.sensor import Sensor, Surroundings
 class CompassSettings(Settings):
     """A compass whose heading error has a constant part and a white part."""
 
-    rate: float = Field(default=10.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=10.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     heading_noise_deg: float = Field(default=1.0, ge=0.0, description="white noise on heading, sd [deg]")
     heading_bias_deg: float = Field(default=0.5, ge=0.0, description="heading bias of a trial, sd [deg]")
     tilt_noise_deg: float = Field(default=0.5, ge=0.0, description="white noise on pitch and on roll, sd [deg]")

@@ -16,7 +16,7 @@ from auvsim.sensors.sensor import Sensor, Surroundings
 class DepthSettings(Settings):
     """A depth gauge whose error has a constant part (tide, air pressure, zero) and a white part."""
 
-    rate: float = Field(default=10.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=10.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     noise: float = Field(default=0.05, ge=0.0, description="white noise, sd [m]")
     bias: float = Field(default=0.1, ge=0.0, description="bias of a trial, sd [m]")
 

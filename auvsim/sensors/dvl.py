@@ -31,7 +31,7 @@ class DvlSettings(Settings):
     """
 
     enabled: bool = Field(default=False, description="whether the vehicle has it")
-    rate: float = Field(default=5.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=5.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     bottom_noise: Vector = Field(
         default=(0.01, 0.01, 0.004), description="white noise over ground: forward, starboard, down, sd [m/s]"
     )
@@ -92,7 +92,7 @@ class Dvl(Sensor):
         self._below = np.array((0.0, 0.0, 0.5 * sum(settings.water_layer)))
 
     def measure(self, truth: Truth, world: Surroundings) -> Reading:
-        """Pings once at each."""
+        """Pings once and measures both tracks."""
         settings = self.settings
         noise = self.biases + self._sigmas * self._noise.normals(6)
         chances = self._noise.uniforms(2)

@@ -20,7 +20,7 @@ _RPM = 2.0 * math.pi / 60.0  # one revolution per minute [rad/s]
 class FeedbackSettings(Settings):
     """Encoders; exact by default, since an encoder's error is far below what a fin's play or a model's error is."""
 
-    rate: float = Field(default=10.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=10.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     fin_noise_deg: float = Field(default=0.0, ge=0.0, description="white noise on each fin angle, sd [deg]")
     fin_resolution_deg: float = Field(default=0.0, ge=0.0, description="step of the fin encoders, 0 for none [deg]")
     shaft_noise_rpm: float = Field(default=0.0, ge=0.0, description="white noise on shaft speed, sd [rpm]")

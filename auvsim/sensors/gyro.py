@@ -23,7 +23,7 @@ class GyroSettings(Settings):
     """
 
     enabled: bool = Field(default=False, description="whether the vehicle has it")
-    rate: float = Field(default=10.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=10.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
     noise_density_deg: float = Field(
         default=0.005, ge=0.0, description="angular random walk: white noise as density [deg/sqrt(s)]"
     )

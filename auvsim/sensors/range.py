@@ -25,7 +25,7 @@ class RangeSettings(Settings):
     """
 
     enabled: bool = Field(default=True, description="whether the vehicle has it")
-    rate: float = Field(default=0.2, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=0.2, gt=0.0, description="readings per second, divides the control rate [Hz]")
     beacon: Vector = Field(default=(0.0, 0.0, 0.0), description="place of the beacon: north, east, depth [m]")
     transponder: Vector = Field(default=(0.0, 0.0, 0.0), description="place in the vehicle's body frame [m]")
     noise: float = Field(default=0.2, ge=0.0, description="white noise, sd [m]")

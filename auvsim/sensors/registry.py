@@ -1,4 +1,4 @@
-"""The sensors by their kinds, and how one is made for a vehicle."""
+"""Registry of the sensors by kind."""
 
 from collections.abc import Callable
 from typing import Any
@@ -7,6 +7,7 @@ from numpy.random import Generator
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
+from auvsim.data.variables import Variable
 from auvsim.sensors.compass import Compass
 from auvsim.sensors.depth import Depth
 from auvsim.sensors.dvl import Dvl
@@ -33,19 +34,23 @@ def build(kind: str, settings: Any, generator: Generator, *, name: str, vehicle:
     """Makes a sensor of a vehicle.
 
     Args:
-        kind: of it.
-        settings: of its class; of a user's own, what stands under `settings`.
-        generator: of its noise.
-        name: of this instance.
-        vehicle: that carries it.
+        kind: of the sensor.
+        settings: an instance of its settings class; for a user's own, what stands under `settings`.
+        generator: random stream of its noise.
+        name: instance name.
+        vehicle: model of the vehicle that carries it.
 
     Raises:
         InputError: there is no such kind, or a user's own cannot be made.
     """
     made = find(kind)
     try:
-        return made(settings, generator, name=name, vehicle=vehicle)
+        sensor = made(settings, generator, name=name, vehicle=vehicle)
     except AuvsimError:
         raise
     except Exception as error:  # a user's class may fail in any way
         raise InputError(f"sensor '{name}' ({kind}) cannot be made: {type(error).__name__}: {error}") from error
+    plugins.require(f"sensor '{name}' ({kind})", sensor, "name", "value", "sizes", "measure")
+    if not isinstance(sensor.value, Variable):
+        raise InputError(f"sensor '{name}' ({kind}): value is {sensor.value!r}, not the Variable that the log holds")
+    return sensor

@@ -1,4 +1,4 @@
-"""The contract of a sensor on board: settings, what it logs, and how it measures."""
+"""The contract of a sensor on board: settings, log variable, measurement."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
@@ -47,15 +47,15 @@ class Sensor(ABC):
     `_noise`, so that a run replays bit for bit and no loss changes other noise.
 
     Args:
-        settings: of the class `Settings`.
-        generator: of all its noise; a stream of its own.
-        name: of this instance, by which its readings are known; its kind by default.
-        vehicle: that carries it; needed where what is measured depends on it.
+        settings: an instance of the class `Settings`.
+        generator: random stream of all its noise, which no other source uses.
+        name: instance name, which its readings carry; its kind by default.
+        vehicle: model of the vehicle that carries it, for sensors that depend on it.
     """
 
     kind: ClassVar[str]
     Settings: ClassVar[type[Settings]]
-    value: Variable  # what a reading's `value` is in the log
+    value: Variable  # the log variable of a reading's `value`
     sizes: Mapping[str, int]  # of the dimensions that `value` names
 
     def __init__(
@@ -71,7 +71,7 @@ class Sensor(ABC):
         """A reading of the state now, or None where the sensor measures nothing."""
 
     def _reading(self, time: float, value: Array) -> Reading:
-        """A reading that is true and arrives at a time [s], with the next sequence number."""
+        """A reading with this time [s] as stamp and arrival, and the next sequence number."""
         sequence = self._sequence
         self._sequence = sequence + 1
         return Reading(self.name, time, time, value, sequence)

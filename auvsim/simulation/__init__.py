@@ -1,1 +1,1 @@
-"""Simulation: scenarios, how they are drawn, and the loop that runs them."""
+"""Simulation: scenarios, how they are drawn, agents, and the loop that runs them."""

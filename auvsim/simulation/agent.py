@@ -1,4 +1,4 @@
-"""One vehicle's mind: its sensors, estimator, mission and controller, and one turn of each."""
+"""The agent of one vehicle: its sensors, estimator, mission and controller, and one step of each."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -24,6 +24,8 @@ from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
 from auvsim.sensors.range import RangeSettings
 from auvsim.sensors.sensor import Surroundings
+from auvsim.simulation import parts
+from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board
 from auvsim.simulation.setups import model_speed, navigator_setup, usbl_dock
@@ -32,7 +34,7 @@ from estimators.core.types import Outcome
 
 
 class Log(Protocol):
-    """Where an agent writes down what happens to it; `data.recorder.Recorder` is one."""
+    """What an agent logs to; `data.recorder.Recorder` is one."""
 
     def append(self, group: str, row: Sequence[Any]) -> None:
         """A row of a group."""
@@ -110,11 +112,19 @@ class Agent:
             ),
         )
         self.sensors = [
-            (_sensor(key, found, noise(key), vehicle), round(rates.control / found.rate))
+            (
+                _sensor(key, found, noise(key), vehicle),
+                round(rates.control / found.rate),
+                Part("sensor", getattr(found, "kind", key), name),
+            )
             for key, found in on_board(settings.sensors)
         ]
         self.gate = Gate(dict(on_board(settings.sensors)), vehicle.actuation)
         self._gated: list[Outcome] = []  # refused by it since the last update of the estimator
+        # Whatever is given in place of the scenario's part is the caller's, who sees what it raises.
+        self._estimator = Part("estimator", "" if navigator else settings.estimator.kind, name)
+        self._mission = Part("mission", "" if mission else settings.mission.kind, name)
+        self._controller = Part("controller", settings.control.kind, name)
         self.estimate: Estimate | None = None
         self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
         self._filter_ticks = round(rates.control / rates.filter)
@@ -125,6 +135,14 @@ class Agent:
         self._to_mission: list[Reading] = []  # since the last update of the mission
         self._end = math.inf
         self.over = False
+        self._running = self._controller  # the part whose code runs now, to blame for what it raises
+        self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
+        groups = ("estimate", "measurements", "mission", "command")
+        self._estimates, self._measurements, self._decisions, self._commands = (f"vehicles/{name}/{g}" for g in groups)
+
+    def blame(self, error: BaseException) -> BaseException:
+        """What to raise in place of an error from within this agent: a user's own part is named."""
+        return self._running.blamed(error)
 
     def groups(self, usbl: tuple[Table, Mapping[str, int]] | None) -> dict[str, Group]:
         """The groups of the vehicle in the log.
@@ -133,7 +151,8 @@ class Agent:
             usbl: variables and sizes of the dock's USBL, if one serves the vehicle.
         """
         actuation = self.vehicle.actuation
-        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _ in self.sensors} | ({"usbl": usbl} if usbl else {})
+        of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _, _ in self.sensors}
+        of_sensors |= {"usbl": usbl} if usbl else {}
         return vehicle_groups(
             sensors=of_sensors,
             mission=(self.mission.phases, self.mission.variables),
@@ -145,8 +164,14 @@ class Agent:
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
         """Takes the readings that are due at a control tick."""
         taken, self._messages = [], []
-        for sensor, every in self.sensors:
-            if ticks % every == 0 and (reading := sensor.measure(truth, world)) is not None:
+        for sensor, every, part in self.sensors:
+            if ticks % every:
+                continue
+            self._running = part
+            reading = sensor.measure(truth, world)
+            if reading is not None:
+                if part.own:
+                    parts.reading(reading, sensor)
                 log.reading(self.name, reading)
                 taken.append(reading)
         suspect = dict(self.gate.refused)
@@ -170,37 +195,51 @@ class Agent:
 
     def navigate(self, ticks: int, time: float, log: Log) -> None:
         """Hands all that arrived to the controller and, when it is due, to the estimator."""
+        self._running = self._controller
         self.controller.observe(self._readings)
         self._to_filter += self._readings
         self._to_mission += self._readings
         self._messages_to_filter += self._messages
-        # Held fast, the vehicle does not move as any model of free motion says: nothing is estimated.
-        if ticks % self._filter_ticks or self.mission.at_rest:
+        # In a latch the vehicle does not move as a model of free motion predicts: nothing is estimated.
+        self._running = self._mission
+        if self.mission.at_rest or ticks % self._filter_ticks:
             return
+        self._running = self._estimator
         e = self.navigator.update(time, self._to_filter, self._messages_to_filter, self.commands)
+        if self._estimator.own:
+            parts.estimate(e, len(self.navigator.states))
         self._to_filter, self._messages_to_filter = [], []
         for kind, text in estimator_events(self.estimate, e):
             log.event(time, self.name, kind, text)
         self.estimate = e
         views = (e.position, e.heading, e.velocity, e.current)
-        log.append(self._path("estimate"), (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
+        log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
         outcomes, self._gated = (*self._gated, *e.outcomes), []
         for o in outcomes:
-            log.append(
-                self._path("measurements"), (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
-            )
+            row = (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
+            log.append(self._measurements, row)
 
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""
         mission, controller = self.mission, self.controller
+        self._running = self._controller
         heading, depth = controller.heading, controller.depth
+        if self._controller.own:
+            parts.smoothed(heading, depth)
         if heading is None or depth is None:
             return None
         readings, self._to_mission = self._to_mission, []
+        self._running = self._mission
         wanted = mission.update(Situation(time, self.estimate, heading, depth, latched, readings, self._messages))
+        if self._mission.own:
+            parts.mission(mission, wanted)
+        row = mission.row()
+        self._running = self._controller
         self.commands = controller.command(wanted)
-        log.append(self._path("mission"), (time, mission.phase, *wanted[:3], *mission.row()))
-        log.append(self._path("command"), (time, *self.commands))
+        if self._controller.own:
+            parts.demand(self.commands, self._demands)
+        log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
+        log.append(self._commands, (time, *self.commands))
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
         mission.events.clear()
@@ -209,8 +248,16 @@ class Agent:
         self.over = time >= self._end
         return self.commands
 
-    def _path(self, group: str) -> str:
-        return f"vehicles/{self.name}/{group}"
+    @property
+    def approach(self) -> int | None:
+        """Number of the mission's approach under way, see `Mission`."""
+        self._running = self._mission
+        return self.mission.approach
+
+    def overdue(self, duration: float) -> str:
+        """What the log says when the time limit [s] of the run ends the mission."""
+        self._running = self._mission
+        return str(self.mission.overdue(duration))
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:

@@ -1,6 +1,6 @@
-"""The dm_env face of a run, through `dm_control.rl.control`: truth in, commands out, once a control period.
+"""A run as a dm_env environment (`dm_control.rl.control`): true state observed, commands given, each control period.
 
-For learning and for controllers of one's own. No sensors or estimators stand between: the observation is the truth.
+For learning and for controllers of one's own. There are no sensors or estimators: the observation is the true state.
 """
 
 import collections
@@ -26,8 +26,8 @@ from auvsim.vehicles.library import Vehicle
 from auvsim.water.terrain import FlatFloor
 
 
-class Puppet:
-    """An agent without sensors and mind: it does what it is told from outside."""
+class CommandedAgent:
+    """An agent without sensors, estimator and mission, which carries out commands from outside."""
 
     dock, mission, over = None, None, False
 
@@ -37,11 +37,15 @@ class Puppet:
         self.name, self.vehicle = name, vehicle
         self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
 
+    def blame(self, error: BaseException) -> BaseException:
+        """The error itself."""
+        return error
+
     def sense(self, *_: Any) -> None:
-        """Senses nothing."""
+        """Takes no readings."""
 
     def receive(self, *_: Any) -> None:
-        """Hears nothing."""
+        """Receives no messages."""
 
     def navigate(self, *_: Any) -> None:
         """Knows nothing."""
@@ -91,7 +95,7 @@ class Docking(control.Task):
         water = current(plan, self._seed, self._episode)
         world = World(scene, water, plan.water.density, data=physics.data.ptr)
         world.reset()
-        self._simulation = Simulation(plan, self._seed, self._episode, world=world, agents=Puppet, record=False)
+        self._simulation = Simulation(plan, self._seed, self._episode, world=world, agents=CommandedAgent, record=False)
         self._episode += 1
         self._distance = self._to_go()
 
@@ -160,7 +164,7 @@ class Docking(control.Task):
         return collections.OrderedDict((name, specs.Array((size,), float, name)) for name, size in sizes.items())
 
     def get_reward(self, physics: Any) -> float:
-        """Metres come nearer since the last step, and 100 when the latch closes."""
+        """Progress since the last step [m], and 100 when the latch closes."""
         before, self._distance = self._distance, self._to_go()
         return before - self._distance + (100.0 if self._is_docked() else 0.0)
 

@@ -1,4 +1,4 @@
-"""The planar truth: a vehicle that is exactly the planar model of the filters, with process noise, as a world."""
+"""A world whose vehicle moves exactly by the planar model of the filters, with process noise."""
 
 import math
 from collections.abc import Sequence
@@ -122,7 +122,7 @@ class PlanarWorld:
 
 
 def process_noise_increments(generator: Generator, densities: Array, step: float, current: Array) -> Array:
-    """What is added to the planar state after each step of `PlanarProcess.walk`: process noise, changes of current.
+    """Increments of the planar state after each step of `PlanarProcess.walk`: process noise, changes of current.
 
     Args:
         generator: gives 8 normals a step.

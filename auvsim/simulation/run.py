@@ -1,5 +1,6 @@
 """The one closed loop: the world moves; every agent senses, navigates and acts; all of it is logged."""
 
+import hashlib
 import math
 import os
 import time as wall
@@ -22,17 +23,18 @@ from auvsim.data.recorder import Recorder
 from auvsim.data.variables import run_groups
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics import scenes
+from auvsim.physics import scenes, soundness
 from auvsim.physics.truth import Truth
 from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
+from auvsim.simulation.parts import PartError
 from auvsim.simulation.scenario import Scenario, to_yaml
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField, build_current, listeners
 
 
 class ProgressState(NamedTuple):
-    """How far a running simulation is."""
+    """Progress of a running simulation."""
 
     time: float  # [s]
     duration: float  # its time limit [s]
@@ -47,6 +49,7 @@ def run(
     trial: int = 0,
     progress: Callable[[ProgressState], None] | None = None,
     path: str | os.PathLike[str] | None = None,
+    check_step: bool = True,
 ) -> Log:
     """Runs a scenario and returns its log, also when it diverges or is interrupted.
 
@@ -55,12 +58,15 @@ def run(
         seed: of all random streams.
         trial: number of the run under that seed.
         progress: called about ten times a simulated minute.
-        path: where the log is to stand, written as it grows; None keeps it in memory.
+        path: file of the log, which grows during the run; None keeps the log in memory.
+        check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
 
     Raises:
         InputError: a model, a part or a number of the scenario cannot be used.
     """
     started = wall.perf_counter()
+    if check_step:
+        check_steps(scenario)
     simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
     log: Any = simulation.log
     with log:
@@ -70,30 +76,33 @@ def run(
                 simulation.step()
                 if progress and simulation.ticks % simulation.progress_ticks == 0:
                     progress(simulation.progress())
+            for agent in simulation.agents:
+                if not agent.over:
+                    log.event(
+                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
+                    )
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
+            if isinstance(error, PartError):
+                log.event(simulation.time, "", "traceback", error.trace)
         except KeyboardInterrupt:
             status = "interrupted"
             log.event(simulation.time, "", "interrupted", "stopped by the user")
-        if status == "complete":
-            for agent in simulation.agents:
-                if not agent.over:
-                    log.event(simulation.time, agent.name, "timeout", agent.mission.overdue(scenario.duration))
         simulation.log_contacts()
         return log.finish(status, wall_time=wall.perf_counter() - started)
 
 
 class Simulation:
-    """The parts of a run, and one turn of its loop, of one control period.
+    """The parts of a run, and its loop, one control period a step.
 
     Args:
         scenario: every number definite.
         seed: of all random streams.
         trial: number of the run under that seed.
-        world: in place of MuJoCo's with the scenario's models: anything with its methods.
-        navigators: in place of the scenario's, by vehicle.
-        missions: likewise.
+        world: replaces MuJoCo's world; anything with the methods of `World`.
+        navigators: replace the scenario's estimators, by vehicle.
+        missions: replace the scenario's missions, by vehicle.
         agents: makes the agent of a vehicle, see `Agent`.
         record: whether anything is logged.
         path: see `run`.
@@ -148,6 +157,7 @@ class Simulation:
             place = np.array(scenario.start_position(name))
             self.place(name, place, math.radians(start.heading_deg), start.speed)
         self.log = self._recorder(seed, trial, path) if record else Unrecorded()
+        self._record_models()
         self._record_truths()
 
     @property
@@ -186,7 +196,7 @@ class Simulation:
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
         for agent in self.agents:
-            agent.sense(self.ticks, self.truths[agent.name], world, log)
+            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
         for ping, fate in self.network.poll(before, self.truths):
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
@@ -197,17 +207,17 @@ class Simulation:
             )
         for agent in self.agents:
             agent.receive(self.network.deliver(agent.name, time))
-            agent.navigate(self.ticks, time, log)
+            with_blame(agent, agent.navigate, self.ticks, time, log)
         for agent in self.agents:
-            demand = agent.act(time, world.latched(agent.name), log)
+            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
             if demand is not None:
-                self._tell_of_approach(agent)
+                self._report_approach(agent)
                 world.command(agent.name, agent.vehicle.actuation.allocate(demand))
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
 
     def progress(self) -> ProgressState:
-        """How far the run is."""
+        """Progress of the run."""
         phases = [(agent.name, agent.mission.phases[agent.mission.phase]) for agent in self.agents]
         text = phases[0][1] if len(phases) == 1 else ", ".join(f"{name} {phase}" for name, phase in phases)
         first = self.agents[0]
@@ -217,22 +227,30 @@ class Simulation:
         return ProgressState(self.time, self.scenario.duration, text, distance)
 
     def log_contacts(self) -> None:
-        """Writes down the contacts of every vehicle, and their impulse so far."""
+        """Logs the contacts of every vehicle, and their impulse so far."""
         for agent in self.agents:
             impulse, tick = 0.0, 1.0 / self.scenario.rates.physics
             for contact in self.world.contacts(agent.name):
                 impulse += contact.force * tick
                 self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
 
+    def _record_models(self) -> None:
+        """Writes down the text of every model, since its file may change or be elsewhere when the log is read."""
+        texts = {("vehicle", self.scenario.vehicles[a.name].model): a.vehicle.source for a in self.agents}
+        for name, place in self._places.items():
+            texts["structure", self.scenario.structures[name].model] = place.structure.source
+        for (kind, model), text in texts.items():
+            self.log.append("models", (0.0, kind, model, hashlib.sha256(text.encode()).hexdigest(), text))
+
     def _record_truths(self) -> None:
         for name, truth in self.truths.items():
             self.log.truth(name, truth)
 
-    def _tell_of_approach(self, agent: Agent) -> None:
-        """Tells currents that turn in approaches how far the first vehicle is on its approach to a dock."""
+    def _report_approach(self, agent: Agent) -> None:
+        """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
         if not self._listeners or agent.mission is None:
             return
-        attempt, dock = agent.mission.approach, agent.mission.dock
+        attempt, dock = agent.approach, agent.mission.dock
         if attempt is not None and dock is not None and agent is self.agents[0]:
             away = self.truths[agent.name].position[:2] - dock.pose.position[:2]
             for listener in self._listeners:
@@ -265,7 +283,7 @@ class Simulation:
         return Recorder(groups, attributes, of_groups, path)
 
     def _attributes_of(self, agent: Agent) -> dict[str, Any]:
-        """What the log says of a vehicle as a whole."""
+        """Attributes of a vehicle in the log."""
         settings = self.scenario.vehicles[agent.name]
         return {
             "model": settings.model,
@@ -280,7 +298,7 @@ class Simulation:
         }
 
     def _attributes_of_structure(self, name: str) -> dict[str, Any]:
-        """What the log says of a structure; its transceiver is that of the first vehicle which it serves."""
+        """Attributes of a structure in the log; its transceiver is that of the first vehicle that it serves."""
         settings = self.scenario.structures[name]
         place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
         served = next((agent.name for agent in self.agents if agent.serves and agent.dock == name), None)
@@ -311,11 +329,33 @@ class Unrecorded:
         """Keeps nothing."""
 
 
+def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
+    """One turn of an agent; what a part of a user's own raises in it names that part.
+
+    Raises:
+        PartError: a part of a user's own raised something.
+    """
+    try:
+        return turn(*arguments)
+    except (Exception, SystemExit) as error:
+        raise agent.blame(error) from error.__cause__
+
+
 def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
     """The current of a run; its draws are from a stream of the only vehicle, or of the water."""
     names = [*scenario.vehicles]
     source = f"{names[0]}/current" if len(names) == 1 else "water/current"
     return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
+
+
+def check_steps(scenario: Scenario) -> None:
+    """Sees that the physics step is short enough for every vehicle.
+
+    Raises:
+        InputError: it is too long; the text says which rate would do.
+    """
+    for model in {settings.model: None for settings in scenario.vehicles.values()}:
+        soundness.check_step(model, scenario.physics.integrator, scenario.rates.physics, scenario.water.density)
 
 
 def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> World:

@@ -1,4 +1,4 @@
-"""From a plan, in which values may be distributions, to definite values, given a seed.
+"""Draws definite values from a plan, in which values may be distributions, given a seed.
 
 A distribution stands where its value would: `range: {uniform: [250, 350]}`. Each draws from a stream of its own, named
 by its dotted key, so that pinning one value changes no other.
@@ -31,7 +31,7 @@ RANDOM = {
     },
 }
 
-# A manoeuvre starts far from the dock, ahead away from it and at another depth; only the current is left to chance.
+# A manoeuvre starts far from the dock, ahead away from it and at another depth; only the current is drawn.
 MANOEUVRE = {
     "vehicle": {
         "start": {"range": 300.0, "bearing_deg": 0.0, "heading_deg": 0.0, "depth": 10.0, "speed": 1.5},
@@ -39,7 +39,7 @@ MANOEUVRE = {
     "dock": {"heading_deg": 180.0},
     "sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}},
 }
-# One whose figures nobody reads off: at a single speed its log could not tell thrust, drag and their loss apart.
+# With a single speed, thrust, drag and loss of thrust could not be identified separately.
 SPEEDS = {"multisine": (1.5, 1.0, 1.8, 1.2)}  # [m/s]
 
 
@@ -151,7 +151,7 @@ def varied(value: Any, path: str = "", chosen: bool = False) -> Iterator[str]:
 
 
 def check(plan: Mapping, places: Mapping[str, str] | None = None) -> None:
-    """Sees that every distribution of a plan makes sense, also those that are seldom chosen.
+    """Checks every distribution of a plan, also those that are seldom chosen.
 
     Raises:
         InputError: For one whose parameters do not.

@@ -1,4 +1,4 @@
-"""What one run is made of: the water, structures, vehicles and what each vehicle carries and does, as one schema."""
+"""The schema of a scenario: water, structures, vehicles, and what each vehicle carries and does."""
 
 import json
 import math
@@ -19,16 +19,17 @@ from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
+from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
 
-Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][\w-]{0,63}$")]
+Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
 
 
 class DatumSettings(Settings):
-    """Where on the earth the origin of NED is; only what speaks of latitudes needs to know."""
+    """Place of the origin of NED on the earth; needed only where latitudes and longitudes are used."""
 
-    latitude: float | None = Field(default=None, ge=-90, le=90, description="of the origin, WGS84 [deg]")
-    longitude: float | None = Field(default=None, ge=-180, le=180, description="likewise [deg]")
+    latitude: float | None = Field(default=None, ge=-90, le=90, description="latitude of the origin, WGS84 [deg]")
+    longitude: float | None = Field(default=None, ge=-180, le=180, description="longitude of the origin, WGS84 [deg]")
 
     @model_validator(mode="after")
     def _whole(self) -> "DatumSettings":
@@ -52,12 +53,12 @@ class Start(Settings):
     range: float = Field(default=300.0, gt=0.0, description="horizontal distance from the dock's mouth [m]")
     bearing_deg: float = Field(
         default=0.0,
-        description="direction seen from the dock, clockwise from the axis on the side vehicles come from [deg]",
+        description="bearing from the dock, clockwise from the axis extended out of the mouth [deg]",
     )
-    north: float | None = Field(default=None, description="a place, with east, instead of range and bearing [m]")
-    east: float | None = Field(default=None, description="likewise [m]")
+    north: float | None = Field(default=None, description="with east: a place instead of range and bearing [m]")
+    east: float | None = Field(default=None, description="with north: a place instead of range and bearing [m]")
     structure: str | None = Field(
-        default=None, description="that range and bearing are from; none: the mission's dock, or the only one"
+        default=None, description="structure that range and bearing are from; none: the mission's dock, or the only one"
     )
     heading_deg: float = Field(default=0.0, description="heading, clockwise from north [deg]")
     depth: float = Field(default=20.0, ge=0.0, description="depth [m]")
@@ -78,18 +79,18 @@ class VehicleSettings(Settings):
     sensors: SensorSettings = SensorSettings()
     estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
-    mission: MissionSettings = Field(default=DockingSettings(), description="What it does, by its `kind`.")
+    mission: MissionSettings = Field(default=DockingSettings(), description="The mission, by its `kind`.")
 
 
 class StructureSettings(Settings):
     """A dock: its model and where it is."""
 
     model: str = Field(default="dock", description="a folder in models/, or the path of an .xml file")
-    north: float = Field(default=0.0, description="of the centre of the mouth, from the datum [m]")
-    east: float = Field(default=0.0, description="likewise [m]")
+    north: float = Field(default=0.0, description="north of the datum, centre of the mouth [m]")
+    east: float = Field(default=0.0, description="east of the datum, centre of the mouth [m]")
     depth: float = Field(default=20.0, gt=0.0, description="depth of the centre of the mouth [m]")
     heading_deg: float = Field(
-        default=0.0, description="course of a vehicle that enters straight, clockwise from north [deg]"
+        default=0.0, description="course of a vehicle that enters along the axis, clockwise from north [deg]"
     )
 
     @property
@@ -158,6 +159,16 @@ class Scenario(Settings):
                                  "north and east")  # fmt: skip
         return self
 
+    @model_validator(mode="after")
+    def _all_in_the_water(self) -> "Scenario":
+        floor = self.water.sea_floor
+        depths = [(f"structures.{name}.depth", structure.depth) for name, structure in self.structures.items()]
+        depths += [(f"vehicles.{name}.start.depth", vehicle.start.depth) for name, vehicle in self.vehicles.items()]
+        for key, depth in depths:
+            if not 0.0 < depth < floor:
+                raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
+        return self
+
     @property
     def lone(self) -> tuple[str, VehicleSettings]:
         """Name and settings of the only vehicle.
@@ -220,7 +231,7 @@ class Scenario(Settings):
 def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
     """A scenario of nested values, in full or, without the key `vehicles`, in the short form for one vehicle.
 
-    What the values leave out has its default. Strict: no text or truth value passes for a number.
+    Values that are left out have their defaults. Strict: a text or truth value is no number.
 
     Args:
         values: As read from YAML.

@@ -1,4 +1,4 @@
-"""What a scenario says of a vehicle's sensors: the standard ones by their kinds, any others by names of the user's."""
+"""Settings of a vehicle's sensors: the standard ones by kind, any others under names of the user's choice."""
 
 from collections.abc import Iterator
 from typing import Any, Literal
@@ -20,7 +20,7 @@ class OwnSensor(OwnPart):
     """A sensor of the user's own."""
 
     enabled: bool = Field(default=True, description="whether the vehicle has it")
-    rate: float = Field(default=1.0, gt=0.0, description="readings a second, divides the control rate [Hz]")
+    rate: float = Field(default=1.0, gt=0.0, description="readings per second, divides the control rate [Hz]")
 
 
 def _of_a_kind(kind: str, settings: type[Settings]) -> type[Settings]:

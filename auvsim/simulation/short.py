@@ -1,6 +1,6 @@
 """The short form of a scenario, for one vehicle and at most one dock: its keys stand without their names.
 
-Scenarios from before there were several vehicles are of this form, too; what they said otherwise is read here.
+Scenarios written before there were several vehicles have this form, too; their older keys are converted here.
 """
 
 import re
@@ -77,9 +77,9 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
 
 
 def renewed(values: Mapping) -> dict:
-    """Values of an earlier form in today's: `start` at the top, and the estimator's kind as `factory`.
+    """Converts values of an earlier form: `start` at the top, and the estimator's kind as `factory`.
 
-    An estimator's settings used to be one class for all kinds; those that its kind never heeded are left out.
+    An estimator's settings used to be one class for all kinds; those that its kind never used are left out.
     """
     values = dict(values)
     if "start" in values:
@@ -112,7 +112,7 @@ def _of_a_kind(estimator: Mapping) -> dict:
 
 
 def _full(short: ShortScenario) -> dict[str, Any]:
-    """What a short scenario says, in full."""
+    """The full form of a short scenario."""
     mission: Any = short.mission or short.guidance
     if short.mission is None and short.manoeuvre is not None:
         mission = {"kind": "manoeuvre", "manoeuvre": short.manoeuvre.model_dump()}
@@ -141,7 +141,7 @@ def _full(short: ShortScenario) -> dict[str, Any]:
 
 
 def _short_key(path: str, short: ShortScenario) -> str:
-    """A dotted key of the full form as the short one has it."""
+    """The short form of a dotted key of the full form."""
     path = re.sub(r"^vehicles\.[\w-]+\.(model|start)\b", r"vehicle.\1", path)
     path = re.sub(r"^vehicles\.[\w-]+\.", "", path)
     path = re.sub(r"^structures\.[\w-]+\.", "dock.", path)

@@ -1,1 +1,1 @@
-"""The models in models/: loading vehicles and docks, and their actuation."""
+"""Vehicles and structures: loading their models, and their actuation."""

@@ -86,8 +86,11 @@ class FinsAndShaft:
 
     def __post_init__(self) -> None:
         count = len(self.fins)
-        if self.matrix.shape != (count, 2) or np.linalg.matrix_rank(self.matrix) < 2:
-            raise InputError(f"the allocation of {count} fins must be ({count}, 2) of rank 2")
+        fits = self.matrix.shape == (count, 2) and np.isfinite(self.matrix).all()
+        if not fits or np.linalg.matrix_rank(self.matrix) < 2:
+            raise InputError(
+                f"the allocation of {count} fins must be ({count}, 2) of rank 2, finite, to steer and to dive"
+            )
         if self.limits.shape != (count + 1, 2) or self.lags.shape != (count + 1,):
             raise InputError(
                 f"{count} fins and a shaft need limits ({count + 1}, 2) and lags ({count + 1},), "

@@ -49,6 +49,7 @@ class Structure:
 
 PACKAGE = Path(auvsim.__file__).parent
 _MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
+INSTANCE = re.compile(r"[A-Za-z_][\w-]{0,63}", re.ASCII)  # what a vehicle or structure may be called
 _MARKS = {"vehicle": '<body name="hull"', "structure": '<site name="capture"'}  # what every MJCF of a kind has
 
 
@@ -101,31 +102,78 @@ def source(kind: str, name: str) -> tuple[Path, str]:
 
 
 def model_name(kind: str, name: str) -> str:
-    """Name of a model as its MJCF says it, without loading it; arguments and errors as of `find`."""
-    _, text = source(kind, name)
-    found = _MODEL.search(text)
-    return found.group(1) if found else "unnamed"
+    """Name of a model as its MJCF says it, without loading it; arguments and errors as of `find`.
+
+    Raises:
+        InputError: it cannot name a vehicle or structure, too.
+    """
+    path, text = source(kind, name)
+    match = _MODEL.search(text)
+    found = match.group(1) if match else "unnamed"
+    if not INSTANCE.fullmatch(found):
+        shown = found if len(found) <= 40 else f"{found[:37]}..."
+        raise InputError(f"model {path}: model=\"{shown}\": give a name of 1 to 64 letters, digits, '_' and '-'")
+    return found
 
 
 def _parse(path: Path, text: str) -> Any:
     try:
-        return mjcf.from_xml_string(text, model_dir=str(path.parent))
+        root: Any = mjcf.from_xml_string(text, model_dir=str(path.parent))
     except Exception as error:  # PyMJCF raises whatever its parsers do
         raise InputError(f"model {path}: {' '.join(str(error).split())[:200]}") from None
+    if root.compiler.angle != "radian":
+        raise InputError(
+            f'model {path}: give <compiler angle="radian"/> and every angle in radians; MuJoCo takes them for degrees '
+            "without it"
+        )
+    return root
 
 
 def _numeric(root: Any, where: str, name: str) -> Any:
     element = root.find("numeric", name)
     if element is None:
         raise InputError(f"model {where} lacks the numeric '{name}'")
-    return np.atleast_1d(np.array(element.data, dtype=float))
+    data = np.atleast_1d(np.array([] if element.data is None else element.data, dtype=float))
+    if not data.size or not np.isfinite(data).all():
+        raise InputError(f"model {where}: the numeric '{name}' is {data.tolist()}; its data must be finite numbers")
+    return data
 
 
-def _site_x(root: Any, where: str, name: str) -> float:
+def _allocation(root: Any, where: str, fins: tuple[str, ...]) -> Array:
+    """Fin angle per unit of rudder and of elevator (m, 2)."""
+    columns = []
+    for name in ("allocation_rudder", "allocation_elevator"):
+        column = _numeric(root, where, name)
+        if column.size != len(fins):
+            known = ", ".join(fins) or "none"
+            raise InputError(
+                f"model {where}: '{name}' has {column.size} numbers; it wants {len(fins)}, one for each fin ({known})"
+            )
+        columns.append(column)
+    return np.stack(columns, axis=-1)
+
+
+def _length(root: Any, where: str, name: str) -> float:
+    """A numeric that is a length [m]."""
+    data = _numeric(root, where, name)
+    if data.size != 1 or data[0] <= 0.0:
+        raise InputError(f"model {where}: '{name}' is {data.tolist()}; it must be one number above 0 [m]")
+    return float(data[0])
+
+
+def _site(root: Any, where: str, name: str) -> Array:
+    """Place (3,) of a site in its body [m]."""
     site = root.find("site", name)
     if site is None:
         raise InputError(f"model {where} lacks the site '{name}'")
-    return float(site.pos[0])
+    place = np.zeros(3) if site.pos is None else np.array(site.pos, dtype=float)
+    if not np.isfinite(place).all():
+        raise InputError(f"model {where}: the site '{name}' is at {place.tolist()}; give finite numbers")
+    return place
+
+
+def _site_x(root: Any, where: str, name: str) -> float:
+    return float(_site(root, where, name)[0])
 
 
 def _attribute(element: Any, name: str) -> Any:
@@ -168,8 +216,11 @@ def vehicle(name: str) -> Vehicle:
     hull = root.find("body", "hull")
     if hull is None:
         raise InputError(f"model {name} lacks the body 'hull'")
+    if root.find("actuator", "shaft") is None:
+        known = ", ".join(str(a.name) for a in root.find_all("actuator")) or "none"
+        raise InputError(f"model {name} lacks the actuator 'shaft', that of its propeller; there are {known}")
     fins = tuple(a.name for a in root.find_all("actuator") if a.name != "shaft")
-    matrix = np.stack([_numeric(root, name, f"allocation_{axis}") for axis in ("rudder", "elevator")], axis=-1)
+    matrix = _allocation(root, name, fins)
     limits = np.stack([_limits(root, name, channel) for channel in (*fins, "shaft")])
     lags = np.array([_lag(root, channel) for channel in (*fins, "shaft")])
     nose = _site_x(root, name, "nose")
@@ -189,12 +240,17 @@ def structure(name: str) -> Structure:
     """
     path, text = source("structure", name)
     root = _parse(path, text)
-    _site_x(root, name, "capture")
+    _site(root, name, "capture")
+    if np.abs(_site(root, name, "mouth")).max() > 1e-6:
+        raise InputError(f"model {name}: the site 'mouth' must be the origin, for a dock's place is that of its mouth")
     dimensions = ("mouth_radius", "throat_radius", "cone_length", "throat_length")
-    return Structure(
-        model=root.model,
-        root=root,
-        source=text,
-        latched=_site_x(root, name, "latched"),
-        **{dimension: float(_numeric(root, name, dimension)[0]) for dimension in dimensions},
-    )
+    lengths = {dimension: _length(root, name, dimension) for dimension in dimensions}
+    latched, (mouth, throat, cone, rest) = _site_x(root, name, "latched"), lengths.values()
+    if throat > mouth:
+        raise InputError(f"model {name}: throat_radius {throat:g} m is more than mouth_radius {mouth:g} m")
+    if not 0.0 < latched < cone + rest:
+        raise InputError(
+            f"model {name}: the site 'latched' is {latched:g} m behind the mouth; it must be between 0 and the stop at "
+            f"{cone + rest:g} m"
+        )
+    return Structure(model=root.model, root=root, source=text, latched=latched, **lengths)

@@ -1,1 +1,1 @@
-"""The water: what its currents are, as data and as fields of time and place."""
+"""Water: currents as settings and as fields of time and place, the sea surface, the sea floor."""

@@ -1,4 +1,4 @@
-"""What a current field is: velocity of the water, its time derivative and its gradient at any time and place, in NED.
+"""The contract of a current field: velocity, its time derivative and its gradient at any time and place, in NED.
 
 A current is where the water flows TO. Every field is continuous; its derivative and gradient are exact, so that the
 material acceleration of the water, which pushes on a body, is right.
@@ -40,7 +40,7 @@ class ProgressListener(Protocol):
     """A field that depends on how far a vehicle's docking attempt has come."""
 
     def approach(self, attempt: int, distance: float, time: float) -> None:
-        """Tells that the vehicle, on the approach of an attempt (from 1), is that far [m] from the dock."""
+        """Reports the vehicle's distance [m] from the dock on the approach of an attempt (from 1)."""
         ...
 
 
@@ -62,7 +62,7 @@ def terms(field: CurrentField) -> tuple[CurrentField, ...]:
 
 
 def listeners(field: CurrentField) -> tuple[ProgressListener, ...]:
-    """The parts of a field that want to be told how docking attempts proceed; most fields have none."""
+    """Parts of a field that depend on how docking attempts proceed; most fields have none."""
     return tuple(part for part in terms(field) if isinstance(part, ProgressListener))
 
 

@@ -87,7 +87,7 @@ class Grid:
         """The water at a time [s] and a position (3,) in NED [m].
 
         Raises:
-            InputError: outside the grid, if it was told to refuse.
+            InputError: outside the grid, if `outside` is `refuse`.
         """
         north, east, depth = np.asarray(position, dtype=float).tolist()
         weights, block = [], []

@@ -29,7 +29,9 @@ class TurningSettings(Settings):
 
     kind: Literal["turning"] = "turning"
     speed: float = Field(default=0.5, ge=0.0, description="horizontal speed [m/s]")
-    direction_deg: float = Field(default=0.0, description="direction it flows to before the turn, from north [deg]")
+    direction_deg: float = Field(
+        default=0.0, description="direction it flows to before the turn, clockwise from north [deg]"
+    )
     angle_deg: float = Field(default=90.0, description="angle of the turn, positive clockwise [deg]")
     start: float = Field(default=120.0, ge=0.0, description="time at which the turn starts [s]")
     end: float = Field(default=130.0, gt=0.0, description="time at which the turn ends [s]")
@@ -42,12 +44,12 @@ class TurningSettings(Settings):
 
 
 class ApproachTurnSettings(Settings):
-    """A uniform current that turns once in every docking attempt, somewhere on its approach: the hard case."""
+    """A uniform current that turns once in every docking attempt, somewhere on its approach."""
 
     kind: Literal["approach_turn"] = "approach_turn"
     speed: float = Field(default=0.5, ge=0.0, description="horizontal speed [m/s]")
     direction_deg: float = Field(
-        default=0.0, description="direction it flows to before the first turn, from north [deg]"
+        default=0.0, description="direction it flows to before the first turn, clockwise from north [deg]"
     )
     angle_deg: float = Field(default=90.0, gt=0.0, description="angle of each turn, to a side drawn at random [deg]")
     duration: float = Field(default=10.0, gt=0.0, description="time that a turn takes [s]")
@@ -104,7 +106,7 @@ class BoundaryLayerSettings(Settings):
     speed: float = Field(default=0.5, ge=0.0, description="horizontal speed above the layer [m/s]")
     direction_deg: float = Field(default=0.0, description="direction it flows to, clockwise from north [deg]")
     floor: float = Field(default=40.0, gt=0.0, description="depth of the sea floor [m]")
-    thickness: float = Field(default=10.0, gt=0.0, description="height to which the floor is felt [m]")
+    thickness: float = Field(default=10.0, gt=0.0, description="thickness of the layer above the sea floor [m]")
     roughness: float = Field(default=0.005, gt=0.0, description="roughness length z_0: sand ripples 0.002 to 0.006 [m]")
 
     @model_validator(mode="after")
@@ -115,7 +117,7 @@ class BoundaryLayerSettings(Settings):
 
 
 class WakeSettings(Settings):
-    """What a structure takes out of the current behind it: lee and wake, to be added to the current itself."""
+    """Velocity deficit behind a structure (lee and wake), to be added to a current."""
 
     kind: Literal["wake"] = "wake"
     north: float = Field(default=0.0, description="place of the structure [m]")
@@ -141,7 +143,7 @@ class WavesSettings(Settings):
         default=3.3, ge=1.0, le=10.0, description="gamma; 1 is Pierson and Moskowitz's spectrum [-]"
     )
     floor: float = Field(default=40.0, gt=0.0, description="depth of the water [m]")
-    components: int = Field(default=40, ge=1, le=1000, description="regular waves of equal energy that make the sea")
+    components: int = Field(default=40, ge=1, le=1000, description="number of regular waves of equal energy in the sea")
 
     @model_validator(mode="after")
     def _unbroken(self) -> "WavesSettings":
@@ -162,9 +164,9 @@ class GridSettings(Settings):
     kind: Literal["grid"] = "grid"
     file: str = Field(description="path of the NetCDF file (classic or NetCDF-4)")
     outside: Literal["refuse", "hold"] = Field(
-        default="refuse", description="refuse places outside, or hold the edge's"
+        default="refuse", description="outside the grid: refuse, or hold the value at its edge"
     )
-    start: float = Field(default=0.0, description="time in the file, after its first, when the trial begins [s]")
+    start: float = Field(default=0.0, description="start of the trial, after the first time in the file [s]")
     northward: str | None = Field(default=None, description="name of the variable, if it has no standard name")
     eastward: str | None = Field(default=None, description="name of the variable, if it has no standard name")
     upward: str | None = Field(default=None, description="name of the variable, if it has no standard name")

@@ -1,4 +1,4 @@
-"""Currents on top of each other."""
+"""Sums of currents."""
 
 from collections.abc import Sequence
 

@@ -1,4 +1,4 @@
-"""The sea surface: where it is above a place, and how it moves."""
+"""The sea surface: its elevation above a place, and how that changes."""
 
 from typing import NamedTuple, Protocol, runtime_checkable
 

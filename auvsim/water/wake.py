@@ -1,4 +1,4 @@
-"""What a structure takes out of the current that flows past it."""
+"""Wake of a structure: the velocity deficit of the current behind it."""
 
 import math
 

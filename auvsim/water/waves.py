@@ -37,7 +37,7 @@ def wave_number(frequency: float, floor: float) -> float:
 class Waves:
     """A sea of regular waves of equal energy, whose frequencies and phases are drawn from the spectrum.
 
-    With theta = k x - omega t + phase along the waves' way, elevation a cos(theta): velocity
+    With theta = k x - omega t + phase along the direction of the waves, elevation a cos(theta): velocity
     `a omega cosh(k (h - z)) / sinh(k h) cos(theta)` along and `a omega sinh(k (h - z)) / sinh(k h) sin(theta)` upward
     (Faltinsen 1990, table 2.1). Above the mean surface it goes on as a straight line in z. Irrotational, and without
     divergence.

@@ -1,1 +1,1 @@
-"""Estimation whatever the vehicle: Gaussians, filters, histories, bounds and consistency."""
+"""Estimation for any vehicle: Gaussians, filters, histories, bounds and consistency."""

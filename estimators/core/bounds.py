@@ -48,15 +48,15 @@ class BoundState(NamedTuple):
 class PosteriorBound:
     """The posterior Cramér-Rao bound along sampled truths, for a `History`.
 
-    With one trajectory it is the bound given that way, which is that of an extended Kalman filter linearised at the
+    With one trajectory it is the bound conditional on it, which is that of an extended Kalman filter linearised at the
     truth; the more the trajectories differ, the lower (the less sharp) it lies.
 
     Args:
-        process: How states move on; its noise must reach all states.
-        models: What the measurements of each kind show; kinds not named are ignored.
+        process: Process model; its noise must reach all states.
+        models: Measurement model of each kind; kinds not named are ignored.
         truths: True states at a time.
         first: (nodes, index) -> the covariance (n, n) at the node at which an estimator starts, or None.
-        noise: What a `DockingEstimator` is to believe of its compass, a `DockingNoise`.
+        noise: Compass noise that a `DockingEstimator` is to assume, a `DockingNoise`.
     """
 
     def __init__(

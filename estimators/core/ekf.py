@@ -14,7 +14,7 @@ from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Innovation:
-    """What a measurement said that the belief did not."""
+    """Innovation of a measurement, with its covariance and gain."""
 
     residual: Array  # (m,)
     covariance: Array  # (m, m) of the residual, S = H P H' + R
@@ -41,7 +41,7 @@ def correct(
     Args:
         belief: State before the measurement.
         measurement: Value (m,) and covariance (m, m).
-        model: What the sensor shows of the state.
+        model: Measurement model of the sensor.
         gate: Probability with which a measurement that fits the models is accepted, 0.999 say; None accepts all.
 
     Raises:

@@ -27,7 +27,7 @@ from estimators.core.types import (
 )
 
 SHORTEST = 0.1  # time between measurements that counts at least, so that no mode ever dies out [s]
-TRUSTED = 3  # measurements taken before the filter believes itself more than two that agree against it
+MIN_ACCEPTED = 3  # measurements accepted before two that agree with each other no longer suffice to correct the filter
 
 
 class InteractingState(NamedTuple):
@@ -65,7 +65,7 @@ class InteractingModelFilter:
         start: See `filter.ModelFilter`.
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at first (m,).
-        mixtures: What is believed of wrong measurements, by kind.
+        mixtures: Model of outliers, by kind.
         recovery: What to do about measurements that are rejected again and again.
         blended: The process that stands for all modes of given probabilities, for smoothing; None: the most probable's.
 
@@ -150,7 +150,7 @@ class InteractingModelFilter:
         if is_wrong or (own and innovation.nis > chi_square(PROBABLE, innovation.residual.size)):
             now = _rejected(state, fix, model, modes, innovation)
             agreeing = self._recovery.agreeing(now, own)
-            enough = self._recovery.suffice(now, own, agreeing, state.accepted >= TRUSTED)
+            enough = self._recovery.suffice(now, own, agreeing, state.accepted >= MIN_ACCEPTED)
             if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED):
                 earlier = agreeing[0] if agreeing else own[-1]
                 beliefs = (self._recovery.recover(state.belief, earlier, now, model),) * len(modes)

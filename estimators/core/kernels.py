@@ -90,7 +90,7 @@ def move(points, u, p, duration, substeps):
 
 @compiled
 def walk(start, inputs, p, h, increments):
-    """States (k + 1, n) from `start`: steps of `h` under `inputs` (k, 2), each followed by its kick (k, n)."""
+    """States (k + 1, n) from `start`: steps of `h` under `inputs` (k, 2), each followed by noise (k, n)."""
     count, n = increments.shape
     states, F = np.empty((count + 1, n)), np.empty((n, n))
     states[0] = start
@@ -147,7 +147,7 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
     The module has `step(x, u, p, h, x', F)`, which fills its last two arguments (F only where it can differ from zero),
     and `predict(mean, covariance, u, p, q, duration, substeps) -> (mean, covariance, finite)`, where q (n,) holds power
     spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi]; and `move` and `walk`
-    for many points and for a long way, see KERNELS.
+    for many points and for long trajectories, see KERNELS.
     """
     wrapping = repr((*wrapped,)) if wrapped else "range(0)"
     return _loaded(function, "step", ("x", "u", "p", "h"), ("following", "F"), KERNELS.format(wrapped=wrapping))

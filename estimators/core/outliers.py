@@ -1,4 +1,4 @@
-"""A measurement that may be an outlier: both possibilities are weighed and merged.
+"""Correction by a measurement that may be an outlier: both hypotheses are weighted and merged.
 
 As probabilistic data association does with measurements of uncertain origin (Bar-Shalom and Tse 1975).
 """
@@ -18,7 +18,7 @@ IMPOSSIBLE = -1e300  # log likelihood of what no hypothesis explains
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Outliers:
-    """How often a sensor's measurements are wrong, and by how much: an equal mix of normal errors."""
+    """Outliers of a sensor: their probability, and their errors as an equal mixture of normal distributions."""
 
     prior: float = 0.03  # probability of each measurement
     # Of each component, in the measurement's unit; where components differ, one tuple of all components instead.
@@ -40,7 +40,7 @@ class MixtureUpdate:
 
 
 def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel, outliers: Outliers) -> MixtureUpdate:
-    """The belief after a measurement that may be an outlier and then says nothing of the state.
+    """The belief after a measurement that may be an outlier, which carries no information on the state.
 
     Raises:
         NotPositiveDefiniteError, NotFiniteError: As `ekf.correct`.

@@ -1,6 +1,6 @@
-"""Smoothing over the delay buffer: what is now known of the states then (Rauch, Tung and Striebel 1965).
+"""Fixed-lag smoothing over the delay buffer: past states given all measurements (Rauch, Tung and Striebel 1965).
 
-Fixed lag: the buffer reaches back as far as it keeps nodes, and each of its poses is refined by all that came after.
+The buffer reaches back as far as it keeps nodes, and each of its poses is refined by all that came after.
 """
 
 from collections.abc import Callable, Sequence

@@ -14,7 +14,7 @@ Source = tuple[str, str]  # kind, source
 def scales(
     outcomes: Iterable[Outcome], sizes: Mapping[str, int] | None = None, robust: bool = True
 ) -> dict[Source, float]:
-    """By how much each source's innovations are larger than the filter believes: 1 if it is consistent.
+    """Innovations of each source relative to those that the filter predicts: 1 if it is consistent.
 
     Args:
         outcomes: Of a run; of several outcomes of one measurement the last counts.

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -133,7 +133,7 @@ class MeasurementModel(Protocol):
         return self.evaluate(x, measurement), self.jacobian(x, measurement)
 
 
-Models = Mapping[str | tuple[str, str], MeasurementModel]  # by kind, or by (kind, source), a source not empty
+Models = Mapping[Any, MeasurementModel]  # by kind, or by (kind, source), a source not empty
 NO_MODEL = "no_model"  # why a measurement is refused of which a filter has no model
 
 

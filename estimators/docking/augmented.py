@@ -1,4 +1,4 @@
-"""The docking filter with the current in its state: a Kalman filter whose gate cannot lock it out."""
+"""The docking filter with the current in its state: a Kalman filter whose gate recovers from its own errors."""
 
 from typing import Literal, Unpack
 
@@ -31,12 +31,12 @@ class AugmentedFilter(ModelFilter):
     The gate widens while fixes are missing. So a fix that comes after a rejected one and is inside the gate, but
     outside its inner 95 %, is compared too: else a belief wrong by some metres would be mended by a wrong current.
 
-    Fixes far noisier than believed may never agree; so after four rejected in a row, whatever their age, the next one
+    Fixes far noisier than assumed may never agree; so after four rejected in a row, whatever their age, the next one
     is taken with the last of them.
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise, and the biases that it estimates besides.
+        noise: Noise that it assumes, and the biases that it estimates besides.
         gate: Probability with which a fix that fits is accepted; None accepts all.
         transform: "extended" (EKF) or "unscented" (UKF).
         **options: See `PlanarModels`.

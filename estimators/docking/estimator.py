@@ -85,7 +85,7 @@ class DockingEstimator:
 
     Args:
         filter: `AugmentedFilter`, `InteractingFilter`, `PaperFilter`, or one of that form.
-        usbl: What is believed of the dock's USBL.
+        usbl: Model of the dock's USBL.
         step: Nominal time between ticks [s].
         keep: Age up to which fixes are used [s].
         compensate_delay: False takes every fix as made at the tick it arrives at, whatever its stamp or number: the

@@ -23,11 +23,11 @@ class InteractingFilter(InteractingModelFilter):
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise, but for the current's; and the biases that it estimates besides.
+        noise: Noise that it assumes, the current's excepted; and the biases that it estimates besides.
         currents: Random walk of the current in each mode [m^2/s^3], the slowest first.
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at the first fix (m,).
-        outliers: What is believed of fixes that are wrong.
+        outliers: Model of outliers among the fixes.
         **options: See `PlanarModels`.
     """
 

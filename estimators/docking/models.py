@@ -1,4 +1,4 @@
-"""What filters on the planar model share: noise, the compass and position models, and the start from a first fix."""
+"""Models that the docking filters share: noise, compass, position, and the start from a first fix."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -21,7 +21,7 @@ AIDED = ("gyro", "dvl_surge", "dvl_sway", "range_")  # how the errors of `aids` 
 
 @dataclass(frozen=True, slots=True)
 class Bias:
-    """What is believed of a constant error before it is estimated; units as in `planar_model.BIASES`."""
+    """Prior of a constant error before it is estimated; units as in `planar_model.BIASES`."""
 
     deviation: float  # standard deviation of its first value
     density: float = 0.0  # of its random walk [its unit squared per second]
@@ -29,10 +29,10 @@ class Bias:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class DockingNoise:
-    """What a docking filter believes of its noise; process noise as power spectral densities.
+    """Noise that a docking filter assumes; process noise as power spectral densities.
 
-    The defaults fit a vehicle whose planar model is a condensed one: accelerations are trusted ten times less than
-    those of the reference study, in which truth and filter shared the model.
+    The defaults suit a planar model that was fitted to a vehicle: the process noise of its accelerations is ten times
+    that of the reference study, in which truth and filter shared the model.
     """
 
     position: float = 4e-4  # [m^2/s]
@@ -144,7 +144,7 @@ class PositionModel(MeasurementModel):
             H[:, self._clock] = ahead + x[6], abeam + x[7]
         value = np.array((x[0] + north, x[1] + east))
         if self._dock_heading is not None:
-            # The dock takes its heading for larger than it is, and so the bearing of all it sees.
+            # The dock's heading is measured too large, and with it the bearing of all that the dock measures.
             c, s = math.cos(x[self._dock_heading]), math.sin(x[self._dock_heading])
             R = np.array(((c, -s), (s, c)))
             value, H = R @ value, R @ H
@@ -180,11 +180,11 @@ class ModelOptions(TypedDict, total=False):
 
 
 class PlanarModels:
-    """The process and measurement models of a docking filter, made of what it believes; and its start.
+    """Process and measurement models of a docking filter, made from its assumptions; and its start.
 
     Args:
         parameters: The vehicle.
-        noise: What the filter believes of its noise, and the biases in its state.
+        noise: Noise that the filter assumes, and the biases in its state.
         transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
         initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
         aids: Sensors besides.
@@ -251,7 +251,7 @@ class PlanarModels:
             return None
         mean = self._mean(heading, nodes[index])
         mean[:2] = fix.value - self.position.evaluate(mean)
-        # The fix is known, so that the position takes on the errors of all else that it shows.
+        # The fix is given, so that the position takes the errors of all other states in it.
         onto = np.eye(mean.size)
         onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
         return self._belief(mean, fix.covariance, onto), fix
@@ -291,7 +291,7 @@ class PlanarModels:
         biases = [noise.biases[name].deviation for name in names]
         covariance = np.diag(np.square([0.0, 0.0, *deviations, *currents, *biases]))
         covariance[:2, :2] = place
-        # What the compass shows too much the heading has too much.
+        # A compass bias is an error of the initial heading.
         J = np.eye(mean.size)
         if "compass" in names:
             J[2, 8 + names.index("compass")] = -1.0

@@ -59,7 +59,7 @@ class PaperFilter:
 
     Args:
         parameters: The vehicle.
-        noise: What it believes of its noise; that of the current is not used.
+        noise: Noise that it assumes; that of the current is not used.
         weights: a_0 .. a_m of eq. 11; None leaves the current zero.
         **options: See `PlanarModels`; the paper's integrator is "euler" with substeps of 0.5 s.
     """

@@ -1,4 +1,4 @@
-"""A dock's acoustic fixes: what a packet holds, and the place in the world that it means (Qiu and Li 2019, eq. 7)."""
+"""Acoustic fixes of a dock: the contents of a packet, and its position in the world (Qiu and Li 2019, eq. 7)."""
 
 import math
 from dataclasses import dataclass
@@ -27,7 +27,7 @@ class UsblFix:
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class UsblModel:
-    """What the vehicle believes of the dock's USBL.
+    """Model of the dock's USBL that the vehicle assumes.
 
     The deviations are those of the paper's Table 1 (square roots of its variances), interpolated on logarithmic axes
     and constant outside; they follow no power law.
@@ -76,7 +76,7 @@ class UsblModel:
 
 
 def raw_fix(fix: UsblFix) -> Measurement:
-    """A packet as the dock measured it, in no world and without covariance: to say that it was refused."""
+    """A packet as the dock measured it, in the dock's frame and without covariance: for a refusal."""
     value, covariance = np.array(fix.position, dtype=float), np.full((3, 3), math.nan)
     return Measurement(
         kind=USBL, value=value, covariance=covariance, stamp=fix.stamp, received=fix.received, sequence=fix.sequence

@@ -24,13 +24,12 @@ from estimators.core.types import Array, ProcessModel
 
 Integrator = Literal["euler", "midpoint"]
 
-# surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: what the vehicle's compass
-# shows too much [rad]; dock_heading: what the dock's compass shows too much [rad]; clock: how much later than its stamp
-# a fix was taken [s].
+# surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: bias of the vehicle's
+# compass [rad]; dock_heading: bias of the dock's compass [rad]; clock: time from a fix's stamp to its true time [s].
 BIASES = ("surge", "compass", "dock_heading", "clock")
 Biases = tuple[str, ...]  # a selection, in the order of BIASES; then errors of other sensors, which only stand there
 
-# Velocities beyond these are no motion of such a vehicle but an outlier's kick; the quadratic damping there would make
+# Velocities beyond these come from outliers, not from the vehicle's motion; the quadratic damping there would make
 # explicit steps of up to MAX_SUBSTEP unstable, so the accelerations are those at the limit.
 SURGE_LIMIT, SWAY_LIMIT, YAW_RATE_LIMIT = 4.0, 2.0, 0.5  # [m/s, m/s, rad/s]
 MAX_SUBSTEP = 0.17  # [s]

@@ -179,7 +179,7 @@ def test_planar_fit(benchmark) -> None:
     """The planar model of the vehicle, once a process."""
 
     def anew() -> planar_fit.PlanarFit:
-        planar_fit.fit_planar_model.cache_clear()
+        planar_fit._fit_model.cache_clear()
         return planar_fit.fit_planar_model("remus100", 1.0, plan().water.density)
 
     assert benchmark.pedantic(anew, rounds=ROUNDS).shaft_speed > 0.0

@@ -10,7 +10,8 @@ from log_samples import PHASES, STATES, record, recorder, sample_log
 
 from auvsim.base.errors import InputError
 from auvsim.data.attributes import RUN_ATTRIBUTES, STRUCTURE_ATTRIBUTES, VEHICLE_ATTRIBUTES
-from auvsim.data.log import Log, differences, pack, read, table_markdown, write
+from auvsim.data.description import table_markdown
+from auvsim.data.log import Log, differences, pack, read, write
 from auvsim.data.variables import ROOT_TABLES, VEHICLE_TABLES, Variable, vehicle_groups
 
 OWN = "vehicles/remus100"

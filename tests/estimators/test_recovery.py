@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from estimators.core.consistency import chi_square
-from estimators.core.types import Array, Gaussian
+from estimators.core.recovery import AGREEMENT, MAX_AGE, Rejected
+from estimators.core.types import Array, Gaussian, Measurement
 from estimators.docking.models import DockingNoise
-from estimators.docking.recovery import AGREEMENT, MAX_AGE, Rejected, agree, recover
+from estimators.docking.recovery import agree, recover
 
 NOISE = DockingNoise(position=0.02, current=4e-3, initial_current=0.4)
 NOW, EARLIER = 100.0, (95.0, 83.0)  # stamps [s]
@@ -20,7 +21,8 @@ def rejected(stamp: float, residual: Array | tuple[float, float], scale: float =
     H = np.zeros((2, 8))
     H[:, :2], H[:, 2] = np.eye(2), (-0.2, 0.35)  # a transponder off-centre shows the heading, too
     covariance = scale * np.array([[SPREAD, CROSS], [CROSS, 0.5 * SPREAD]])
-    return Rejected(stamp, np.array(residual), H, covariance)
+    fix = Measurement(kind="usbl", value=np.zeros(2), covariance=covariance, stamp=stamp, received=stamp)
+    return Rejected(fix, np.array(residual), H)
 
 
 def simulated_drift(ages: Array, count: int = 40_000) -> Array:
@@ -48,9 +50,9 @@ def test_fixes_agree_up_to_the_quantile_of_what_a_drifting_current_does() -> Non
     now = rejected(NOW, (0.0, 0.0))
     earlier = [rejected(stamp, (0.0, 0.0), 2.0) for stamp in EARLIER]
     drift = simulated_drift(NOW - np.array(EARLIER))
-    S = np.kron(drift, np.eye(2)) + np.kron(np.ones((2, 2)), now.covariance)
+    S = np.kron(drift, np.eye(2)) + np.kron(np.ones((2, 2)), now.measurement.covariance)
     for k, fix in enumerate(earlier):
-        S[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += fix.covariance
+        S[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] += fix.measurement.covariance
     generator = np.random.default_rng(2)
     vectors = np.linalg.eigh(S)[1].T
     for direction in (*vectors, *generator.standard_normal((20, 4))):
@@ -83,8 +85,8 @@ def test_recovery_is_the_least_squares_of_both_fixes(age: float) -> None:
     H_then[:, 6:8] = -age * np.eye(2)
     vector = np.zeros(10)
     for H, fix in ((H_now, now), (H_then, earlier)):
-        information += H.T @ np.linalg.solve(fix.covariance, H)
-        vector += H.T @ np.linalg.solve(fix.covariance, fix.residual)
+        information += H.T @ np.linalg.solve(fix.measurement.covariance, H)
+        vector += H.T @ np.linalg.solve(fix.measurement.covariance, fix.residual)
     covariance = np.linalg.inv(information)
     assert found.mean - belief.mean == pytest.approx((covariance @ vector)[:8], rel=1e-6, abs=1e-8)
     assert found.covariance == pytest.approx(covariance[:8, :8], rel=1e-6, abs=1e-8)

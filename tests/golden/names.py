@@ -27,8 +27,16 @@ CHANGED: dict[str, str] = {
     "event/vehicle": "earlier logs had one vehicle, and did not say which events are of the run",
 }
 
-# What may differ between two runs of the same scenario: wall-clock time and versions.
-FREE = ("@wall_time", "@format_version", "@auvsim_version", "@mujoco_version", "@numpy_version", "@numba_version")
+# What may differ between two runs of the same scenario: wall-clock time and versions, and words in a model's file.
+FREE = (
+    "models",
+    "@wall_time",
+    "@format_version",
+    "@auvsim_version",
+    "@mujoco_version",
+    "@numpy_version",
+    "@numba_version",
+)
 
 
 def below(path: str, group: str) -> bool:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 from lopsided import TRANSPONDER
-from synthetic import DOCK_DEPTH, DOCK_HEADING, trial_log
+from synthetic import DOCK, DOCK_HEADING, trial_log
 
 from auvsim.base.frames import rotation
 from auvsim.data import log as logs
@@ -28,15 +28,25 @@ def test_positions_are_those_of_the_origin(tmp_path: Path) -> None:
         place = np.array([np.interp(stamp, truth["time"], axis) for axis in truth["position"].T])
         heading = float(np.interp(stamp, truth["time"], np.unwrap(truth["attitude"][:, 2])))
         there = place + rotation(0.0, 0.0, heading) @ TRANSPONDER
-        packets.append([*(dock.T @ (there - [0.0, 0.0, DOCK_DEPTH]) - TRANSCEIVER), *packet[3:]])
+        packets.append([*(dock.T @ (there - DOCK) - TRANSCEIVER), *packet[3:]])
         places.append(place[:2])
     times, attitude = truth["time"], truth["attitude"]
-    compass = {"time": times, "received": times, "value": attitude[:, ::-1], "sequence": np.arange(len(times))}
-    groups = {**log.groups, "usbl": {**usbl, "value": np.array(packets)}, "compass": {**log["compass"], **compass}}
+    compass = {
+        "time": times,
+        "received": times,
+        "value": attitude[:, ::-1],
+        "sequence": np.arange(len(times), dtype=np.int32),
+    }
+    at = "vehicles/remus100/sensors/"
+    own = {at + "usbl": {**usbl, "value": np.array(packets)}, at + "compass": {**log["compass"], **compass}}
+    groups = {**log.log.groups, **own}
     plan = scenario.parse({"sensors": {"usbl": {"transponder": TRANSPONDER, "transceiver": TRANSCEIVER}}})
     names = (f"transceiver_{axis}" for axis in ("forward", "starboard", "down"))
-    attributes = {**log.attributes, **dict(zip(names, TRANSCEIVER, strict=True)), "scenario": scenario.to_yaml(plan)}
-    logs.write(dataclasses.replace(log, groups=groups, attributes=attributes), tmp_path / "trial.nc")
+    dock_says = {**log.log.group_attributes["structures/dock"], **dict(zip(names, TRANSCEIVER, strict=True))}
+    of_groups = {**log.log.group_attributes, "structures/dock": dock_says}
+    attributes = {**log.log.attributes, "scenario": scenario.to_yaml(plan)}
+    changed = dataclasses.replace(log.log, groups=groups, attributes=attributes, group_attributes=of_groups)
+    logs.write(changed, tmp_path / "trial.nc")
 
     parts, _, vehicle = signals(tmp_path / "trial.nc")
     found = parts[0].signals

@@ -211,7 +211,7 @@ def test_factory_of_ones_own_from_a_package(tmp_path, monkeypatch) -> None:
         ("own_module:nothing", "estimator 'own_module:nothing': AttributeError: "),
         ("own_module:number", "estimator 'own_module:number' is not callable; it must be factory("),
         ("own_module:failing", "estimator 'own_module:failing' cannot be made: ZeroDivisionError: division by nothing"),
-        ("own_module:half", "estimator 'own_module:half' made a Half without reset; see Navigator"),
+        ("own_module:half", "estimator 'own_module:half' made a Half without reset, states"),
         ("own_module:Half", "estimator 'own_module:Half' cannot be made: TypeError: "),
         ("broken_module:factory", "estimator 'broken_module:factory': SyntaxError: "),
     ],

@@ -1,1 +1,1 @@
-"""Docking: guidance into a funnel dock, and what a docking log says."""
+"""Docking: guidance into a funnel dock, and metrics of docking logs."""

@@ -1,4 +1,4 @@
-"""A vehicle's places seen from its dock: along its axis, to starboard of it, below it."""
+"""The dock's frame: positions along the dock's axis, to starboard of it and below it."""
 
 import math
 

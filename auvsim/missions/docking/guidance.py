@@ -28,8 +28,8 @@ from auvsim.navigation.estimate import Estimate
 CLEAR = 4.0  # distance that the go-around keeps from the entrance [m]
 BESIDE = 3.0  # distance from the axis at which the vehicle would pass the dock [m]
 BACKING = 60.0  # longest time of backing out [s]
-ABEAM = (-5.0, 40.0)  # the way round the dock: along the axis and to either side of it [m]
-BEFORE = 40.0  # distance before the entrance from which nothing is in the way to a gate [m]
+ABEAM = (-5.0, 40.0)  # detour round the dock: along the axis and to either side of it [m]
+BEFORE = 40.0  # distance before the entrance from which the path to a gate is clear [m]
 
 
 class Phase(IntEnum):
@@ -45,13 +45,13 @@ class Phase(IntEnum):
 
 
 class DockingSettings(Settings):
-    """Docking: how the vehicle comes in."""
+    """Settings of docking: homing, approach, attempts and time limits."""
 
     kind: Literal["docking"] = Field(
         default="docking", description="docking, manoeuvre, track, or package.module:Class"
     )
     dock: str | None = Field(default=None, description="name of the structure to dock at; none: the only one")
-    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water on the way to the gate [m/s]")
+    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water while homing to the gate [m/s]")
     approach_speed: float = Field(default=1.0, gt=0, description="speed through the water on the approach [m/s]")
     gate_distance: float = Field(default=200.0, gt=0, description="distance of the gate before the entrance [m]")
     gate_radius: float = Field(default=20.0, gt=0, description="distance at which the gate counts as reached [m]")
@@ -148,9 +148,9 @@ class Docking(Mission):
         self._north = self._east = math.nan  # of the nose, from the mouth [m]
         self._current = (0.0, 0.0)  # north, east [m/s]
         self._side = 1.0  # on which the dock is passed: 1 to starboard of its axis
-        self._leg = 1  # of the way to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
+        self._leg = 1  # of the path to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
         self._phase_start = 0.0
-        self._occupant: str | None = None  # another vehicle in the dock, as its packets say
+        self._occupant: str | None = None  # another vehicle in the dock, as reported in its packets
 
     @property
     def dock_depth(self) -> float:

@@ -1,4 +1,4 @@
-"""What a docking is judged by: pure functions of a vehicle's log."""
+"""Metrics of a docking: pure functions of a vehicle's log."""
 
 import dataclasses
 import math
@@ -32,7 +32,7 @@ class Crossing:
 def docking_metrics(log: VehicleLog) -> dict[str, Any]:
     """Whether and how the vehicle docked: the values of `Docking.columns`, and every crossing of the mouth's plane.
 
-    Contacts count until the latch held; what the current then presses against the dock is no impact.
+    Contacts count until the latch holds: the current's push against the dock thereafter is no impact.
     """
     passed = crossings(log)
     last = next((c for c in passed if c.attempt == passed[-1].attempt), None)

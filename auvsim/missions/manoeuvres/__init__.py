@@ -1,1 +1,1 @@
-"""Standard manoeuvres from which a vehicle is identified, and what their logs say."""
+"""Standard manoeuvres for identification, and their metrics."""

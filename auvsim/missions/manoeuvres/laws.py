@@ -35,7 +35,7 @@ Law = Callable[[float, float], float | None]
 
 
 class Order(NamedTuple):
-    """What a manoeuvre asks for now."""
+    """Rudder or course, and speed, that a manoeuvre demands now."""
 
     course: float  # that is held where there is no rudder [rad]
     rudder: float | None  # effective rudder, positive to starboard [rad]
@@ -78,7 +78,7 @@ def speeds(settings: ManoeuvreSettings) -> set[float]:
 
 
 class Steering:
-    """A manoeuvre as orders in time.
+    """Steers a manoeuvre: gives its orders in time.
 
     Args:
         settings: the manoeuvre.

@@ -1,4 +1,4 @@
-"""What engineers read off a manoeuvre: pure functions of a log's truth, relative to the water.
+"""Metrics of manoeuvres (ITTC, IMO): pure functions of a log's truth, relative to the water.
 
 Definitions: IMO MSC.137(76) and MSC/Circ.1053, ITTC 7.5-02-06-01. The track is that through the water, so that a
 current, which those trials are corrected for, does not matter.
@@ -137,7 +137,7 @@ def manoeuvre_metrics(log: VehicleLog) -> dict[str, Any]:
 
 
 def figures(log: VehicleLog) -> list[Figures]:
-    """What can be read off each manoeuvre of a log.
+    """Figures of each manoeuvre of a log.
 
     Raises:
         InputError: the vehicle did something else.

@@ -45,5 +45,5 @@ class Manoeuvre(Mission):
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
-        """What engineers read off the manoeuvre."""
+        """Metrics of the manoeuvre."""
         return manoeuvre_metrics(log)

@@ -1,4 +1,4 @@
-"""Manoeuvres as data: the settings of every kind, each of which begins with an approach on a straight course."""
+"""Settings of every kind of manoeuvre; each begins with an approach on a straight course."""
 
 from itertools import pairwise
 from typing import Annotated, Literal
@@ -26,7 +26,7 @@ class _Timed(Settings):
 
 
 class _Lasting(_Timed):
-    """One that goes on until its time is over."""
+    """A manoeuvre of a given duration."""
 
     duration: float = Field(default=300.0, gt=0, description="time with the approach [s]")
 
@@ -144,7 +144,7 @@ class TableSettings(_Lasting):
 
 
 class OptimalSettings(_Lasting):
-    """The table of rudder and speed from which most is learnt within limits; `auvsim manoeuvre optimal` designs it."""
+    """The most informative table of rudder and speed within limits; `auvsim manoeuvre optimal` designs it."""
 
     kind: Literal["optimal"] = "optimal"
     rudder_deg: float | None = Field(default=None, gt=0, description="largest rudder; null: the fins' limit [deg]")
@@ -203,7 +203,7 @@ SequenceSettings.model_rebuild()
 
 
 class ManoeuvreMissionSettings(Settings):
-    """A manoeuvre, from which the vehicle is identified, instead of docking."""
+    """A manoeuvre as a mission, for identification."""
 
     kind: Literal["manoeuvre"] = "manoeuvre"
     manoeuvre: ManoeuvreSettings = Field(description="what the vehicle does, by its `kind`")

@@ -1,4 +1,4 @@
-"""How well a track was kept: pure functions of its log."""
+"""Metrics of a track: pure functions of its log."""
 
 import math
 from typing import Any
@@ -13,7 +13,7 @@ from auvsim.missions.track import patterns
 def track_metrics(log: VehicleLog) -> dict[str, Any]:
     """Whether the track was finished, how many waypoints were reached, and the true distance from its legs, rms.
 
-    The way to the first waypoint is no leg of the track and does not count.
+    The transit to the first waypoint is not a leg of the track and does not count.
     """
     mission, truth = log["mission"], log["truth"]
     settings = yaml_text.read(str(log.attributes["mission_settings"]), "log").value

@@ -85,7 +85,7 @@ class Track(Mission):
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
-        """How well the track was kept."""
+        """Metrics of the track."""
         return track_metrics(log)
 
     def _is_past(self, north: float, east: float) -> bool:

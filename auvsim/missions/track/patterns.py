@@ -1,4 +1,4 @@
-"""Tracks as data, and their waypoints."""
+"""Settings of tracks, and their waypoints."""
 
 import math
 from typing import Annotated, Literal
@@ -7,7 +7,7 @@ import numpy as np
 from pydantic import Discriminator, Field, Tag
 
 from auvsim.base.frames import Array
-from auvsim.base.settings import Settings, tell
+from auvsim.base.settings import Settings, tag_by_kind
 
 
 class Waypoints(Settings):
@@ -20,20 +20,20 @@ class Waypoints(Settings):
 
 
 class LawnMower(Settings):
-    """Parallel lanes, sailed to and fro."""
+    """Parallel lanes in alternating directions."""
 
     kind: Literal["lawn_mower"] = "lawn_mower"
-    corner: tuple[float, float] = Field(default=(0.0, 0.0), description="north, east of the first lane's begin [m]")
+    corner: tuple[float, float] = Field(default=(0.0, 0.0), description="start of the first lane: north, east [m]")
     heading_deg: float = Field(default=0.0, description="course of the first lane, clockwise from north [deg]")
-    length: float = Field(default=100.0, gt=0, description="of a lane [m]")
-    spacing: float = Field(default=30.0, gt=0, description="from lane to lane [m]")
-    lanes: int = Field(default=4, ge=1, description="how many")
-    side: Literal["starboard", "port"] = Field(default="starboard", description="on which the next lane lies")
+    length: float = Field(default=100.0, gt=0, description="length of a lane [m]")
+    spacing: float = Field(default=30.0, gt=0, description="distance between lanes [m]")
+    lanes: int = Field(default=4, ge=1, description="number of lanes")
+    side: Literal["starboard", "port"] = Field(default="starboard", description="side of the other lanes")
 
 
 Pattern = Annotated[
     Annotated[Waypoints, Tag("Waypoints")] | Annotated[LawnMower, Tag("LawnMower")],
-    Discriminator(tell(Waypoints, LawnMower)),
+    Discriminator(tag_by_kind(Waypoints, LawnMower)),
 ]
 
 

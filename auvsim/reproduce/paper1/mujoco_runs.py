@@ -141,7 +141,7 @@ def run_ticks(conditions: RunConditions, plan: Scenario, seed: int) -> tuple[Tic
     parts: dict[str, Any] = {"navigators": {VEHICLE: listener}, "missions": {VEHICLE: steered}}
     simulation = Simulation(plan, seed, world=world, record=False, **parts)
     listener.truth = steered.truth = lambda: simulation.truths[VEHICLE]
-    for sensor, _ in simulation.agents[0].sensors:
+    for sensor, *_ in simulation.agents[0].sensors:
         if isinstance(sensor, Compass) and conditions.compass_bias is not None:
             sensor.heading_bias = conditions.compass_bias
     distance = conditions.approach or conditions.radius
