@@ -52,7 +52,7 @@ def _recording(signals: Signals, vehicle: str) -> Recording:
     given = signals.signals
     start = min(float(s.times[0]) for s in given.values())
     end = max(float(s.times[-1]) for s in given.values())
-    times = start + STEP * np.arange(math.floor((end - start) / STEP + 1e-6) + 1)
+    times = start + STEP * np.arange(math.floor((end - start) / STEP + 1e-6) + 1, dtype=np.float64)
     if len(times) < 2:
         raise InputError(f"{signals.name}: lasts {end - start:g} s; an estimator takes steps of {STEP:g} s")
     actuation, settings = library.vehicle(vehicle).actuation, _settings(signals)
@@ -96,8 +96,9 @@ def _settings(signals: Signals) -> dict[str, Any]:
     tracks = [name for name in TRACKS if name in given]
     if tracks:
         u, v, through, across = (signals.deviation(name) for name in TRACKS)
-        noises = {"bottom_noise": (u, v, v), "water_noise": (through, across, across)}
-        found["dvl"] = DvlSettings(enabled=True, rate=_rate(given[tracks[0]]), **noises)
+        found["dvl"] = DvlSettings(
+            enabled=True, rate=_rate(given[tracks[0]]), bottom_noise=(u, v, v), water_noise=(through, across, across)
+        )
     if {"north", "east"} <= given.keys():
         found["fix"] = FixSettings(noise=signals.deviation("north"))
     return found

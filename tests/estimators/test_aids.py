@@ -111,7 +111,7 @@ def test_constant_errors_of_ranges_are_in_a_start():
     change = moved.mean[:2] - one.mean[:2]
     gain = -other.covariance[:2, 8] / 2.0**2  # of the place by the error
     # The belief moves against its own bias state: a range that is 1 m long is explained by either.
-    assert change == pytest.approx(gain * shift, abs=0.02 * np.linalg.norm(change) + 0.02)
+    assert change == pytest.approx(gain * shift, abs=0.02 * float(np.linalg.norm(change)) + 0.02)
     grown = other.covariance[:2, :2] - one.covariance[:2, :2]
     assert grown == pytest.approx(4.0 * np.outer(gain, gain), rel=1e-6, abs=1e-9)
 

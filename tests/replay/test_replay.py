@@ -155,8 +155,8 @@ def test_smoothing_lowers_the_error(plain: Recording):
     filtered, smoothed = (judgement.judge(one) for one in replay(plain, smooth=True))
     assert smoothed.quality is not None
     assert filtered.quality is not None
-    assert smoothed.quality.position_rms < filtered.quality.position_rms
-    assert smoothed.quality.current_rms < 0.5 * filtered.quality.current_rms
+    assert (smoothed.quality.position_rms or math.inf) < (filtered.quality.position_rms or 0.0)
+    assert (smoothed.quality.current_rms or math.inf) < 0.5 * (filtered.quality.current_rms or 0.0)
     last = [one.replayed.estimates[-1] for one in (filtered, smoothed)]
     assert last[0].position.tolist() == last[1].position.tolist()
     assert smoothed.sensors == ()
@@ -214,8 +214,8 @@ def table(path: Path, noise: float = 0.5, seed: int = 0) -> Any:
         for k in range(3001):
             t = 0.1 * k
             psi = 0.4 + rate * t
-            place = (20.0 * math.sin(psi), -20.0 * math.cos(psi))
-            fix = [f"{x + noise * generator.normal():.4f}" for x in place] if k % 100 == 50 else ["", ""]
+            at = (20.0 * math.sin(psi), -20.0 * math.cos(psi))
+            fix = [f"{x + noise * generator.normal():.4f}" for x in at] if k % 100 == 50 else ["", ""]
             dvl = [1.5 + 0.01 * generator.normal(), 0.01 * generator.normal()] if k % 2 == 0 else ["", ""]
             heading = math.degrees(psi + 0.02 * generator.normal()) % 360.0
             writer.writerow([f"{t:.1f}", heading, math.degrees(rate + 1e-3 * generator.normal()), *dvl, *fix])
