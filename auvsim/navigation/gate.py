@@ -60,7 +60,7 @@ class Gate:
         values = reading.value.tolist()
         lost = [False] * len(values)
         if len(values) == 6:  # a DVL's two tracks
-            lost = [track for track in np.isnan(reading.value.reshape(2, 3)).all(axis=1) for _ in range(3)]
+            lost = np.repeat(np.isnan(reading.value.reshape(2, 3)).all(axis=1), 3).tolist()
         reasons = [
             screen.judge(reading.stamp, value)
             for screen, value, away in zip(screens, values, lost, strict=False)

@@ -1,7 +1,7 @@
 """Dead reckoning by DVL, gyro and compass, corrected by fixes and ranges: for vehicles of which no model is known."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,12 +42,12 @@ class ReckoningNavigator:
         motion = constant_velocity(turning=True)
         for name, unit in BIASES.items():
             motion = with_error(motion, name, unit)
-        self.states = dict(motion.space.units)
+        self.states: Mapping[str, str] = dict(motion.space.units)
         self._space, self._sensors = motion.space, dict(setup.sensors)
         self._compass_bias = math.radians(s.compass_error_deg)
         self._located = (setup.dock is not None and setup.usbl.enabled) or bool(of_kind(self._sensors, FixSettings))
         self._ranged = bool(of_kind(self._sensors, RangeSettings))
-        self._dock = None if setup.dock is None else setup.dock.position[:2]
+        self._dock = np.zeros(2) if setup.dock is None else setup.dock.position[:2]
         self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))
         process = MotionProcess(
             motion,

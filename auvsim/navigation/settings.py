@@ -32,8 +32,8 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, "
-        "dead_reckoning, or package.module:factory",
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, regular_ekf, "
+        "module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
@@ -48,7 +48,7 @@ class AugmentedSettings(_Assumed):
         default=True, description="whether that error is a constant, which is estimated, or white noise of each fix"
     )
     use: tuple[Literal["gyro", "dvl", "range"], ...] = Field(
-        default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass, depth and USBL"
+        default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass and USBL"
     )
 
 

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvsim.analysis.estimates import EstimateErrors, EstimateQuality, estimate_errors, estimate_quality
 from auvsim.base.errors import InputError
-from auvsim.base.frames import Array
 from auvsim.data import log as logs
 from auvsim.data.log import Log
 from auvsim.data.variables import ESTIMATE, MEASUREMENTS, Variable
@@ -122,7 +122,7 @@ def as_log(replayed: Replayed) -> Log:
     )
 
 
-def estimate_columns(replayed: Replayed) -> dict[str, Array]:
+def estimate_columns(replayed: Replayed) -> dict[str, NDArray[Any]]:
     """The columns of the log's group of estimates."""
     e, n = replayed.estimates, len(replayed.states)
     return {

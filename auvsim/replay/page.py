@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from auvsim.analysis.estimates import NEES_INTERVAL
 from auvsim.analysis.style import DOCK, OUTLIER, dress, save, vehicle_colour
@@ -99,7 +100,7 @@ def _consistency(axes: Axes, judgements: Sequence[Judgement]) -> None:
     dress(axes, "NEES of the horizontal position, and where 95 % of a consistent filter's lie", "time [s]", "[-]")
 
 
-def _initialised(judgement: Judgement) -> tuple[Array, Array, Array, Array]:
+def _initialised(judgement: Judgement) -> tuple[Array, Array, Array, NDArray[np.bool_]]:
     """Times, positions, horizontal standard deviations, and which estimates they are of: those that know a position."""
     estimates = judgement.replayed.estimates
     there = np.array([e.initialised for e in estimates], dtype=bool)
