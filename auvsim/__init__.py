@@ -6,11 +6,13 @@
 from importlib import import_module
 from typing import Any
 
+from auvsim.base.compiled import choose_cache
 from auvsim.base.renderer import choose_renderer
 
 __version__ = "0.1.0"
 
-choose_renderer()  # before anything here imports MuJoCo
+RENDERER_NOTE = choose_renderer()  # before anything here imports MuJoCo
+CACHE_NOTE = choose_cache()  # before anything here imports numba
 
 _FIRST_CELL = {  # the names of a notebook's first cell, and where they are
     "run": ("auvsim.simulation.run", "run"),

@@ -5,6 +5,7 @@ from typing import Any
 
 from auvsim.physics.truth import Truth
 from auvsim.water.currents import CurrentField, Uniform
+from auvsim.water.terrain import FlatFloor, Terrain
 
 
 @dataclass(frozen=True)
@@ -12,7 +13,7 @@ class Around:
     """Still water over a flat floor, with nothing in it, if not said otherwise."""
 
     current: CurrentField = field(default_factory=lambda: Uniform((0.0, 0.0, 0.0)))
-    floor: float = 40.0
+    terrain: Terrain = field(default_factory=lambda: FlatFloor(40.0))
     structures: dict[str, Any] = field(default_factory=dict)
     vehicles: dict[str, Truth] = field(default_factory=dict)
 

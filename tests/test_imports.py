@@ -49,12 +49,14 @@ def allowed(module: str, imported: str) -> bool:
     if root != "auvsim":
         return True
     if name in ORDER:
-        return (part not in ORDER and part in ("", "__version__")) or (
+        return (part not in ORDER and part in ("", "__version__", "CACHE_NOTE", "RENDERER_NOTE")) or (
             part in ORDER and ORDER.index(part) <= ORDER.index(name)
         )
-    # The package itself chooses the renderer. What else it offers it imports by name when it is first used, so that
-    # `import auvsim` stays fast and MuJoCo is imported after that choice. Run as a program, it is the command.
-    return imported == ("auvsim.cli.main" if name == "__main__" else "auvsim.base.renderer.choose_renderer")
+    # The package itself chooses the renderer and numba's cache. What else it offers it imports by name when it is first
+    # used, so that `import auvsim` stays fast and MuJoCo is imported after that choice. Run as a program, it is the
+    # command.
+    choices = ("auvsim.base.renderer.choose_renderer", "auvsim.base.compiled.choose_cache")
+    return imported in (("auvsim.cli.main",) if name == "__main__" else choices)
 
 
 @pytest.mark.parametrize("path", MODULES, ids=lambda path: str(path.relative_to(ROOT)))

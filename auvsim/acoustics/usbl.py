@@ -38,10 +38,10 @@ class UsblSettings(Settings):
     dock: str | None = Field(
         default=None, description="structure that serves the vehicle; none: its mission's dock, or the only one"
     )
-    interval: float = Field(default=5.0, gt=0.0, description="mean time from ping to ping; the first is random [s]")
+    interval: float = Field(default=5.0, ge=0.05, description="mean time from ping to ping; the first is random [s]")
     jitter: float = Field(default=1.0, ge=0.0, description="half width of the interval's uniform distribution [s]")
     near_range: float | None = Field(default=None, gt=0.0, description="range below which to ping faster [m]")
-    near_interval: float | None = Field(default=None, gt=0.0, description="mean interval there; jitter in ratio [s]")
+    near_interval: float | None = Field(default=None, ge=0.05, description="mean interval there; jitter in ratio [s]")
     maximum_range: float | None = Field(default=None, gt=0.0, description="range beyond which pings are lost [m]")
     noise: tuple[tuple[float, float], ...] = Field(
         default=((12.0, 0.0067), (40.0, 0.0678), (100.0, 0.3390), (200.0, 0.4807)),

@@ -23,4 +23,5 @@ class DrawingError(AuvsimError):
 
 def unknown_name(kind: str, name: str, known: "list[str]") -> InputError:
     """An error that lists the names that do exist: `no vehicle 'remus'; there are lauv, remus100`."""
+    name = name if len(name) <= 100 else f"{name[:97]}..."
     return InputError(f"no {kind} '{name}'; there are {', '.join(sorted(known)) or 'none'}")

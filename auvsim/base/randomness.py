@@ -10,6 +10,8 @@ from numpy.random import PCG64, Generator, SeedSequence
 
 from auvsim.base.errors import InputError
 
+LARGEST = 2**63  # seeds and trials are below, as are the integers of a log
+
 
 def stream(seed: int, trial: int, name: str) -> Generator:
     """The generator of one named noise source in one trial.
@@ -20,10 +22,10 @@ def stream(seed: int, trial: int, name: str) -> Generator:
         name: Name of the source, for example `remus100/compass`.
 
     Raises:
-        InputError: If the seed or the trial is negative.
+        InputError: If the seed or the trial is negative, or more than a log can hold.
     """
-    if seed < 0 or trial < 0:
-        raise InputError(f"seed {seed}, trial {trial}: both must be whole numbers >= 0")
+    if not (0 <= seed < LARGEST and 0 <= trial < LARGEST):
+        raise InputError(f"seed {seed}, trial {trial}: both must be whole numbers >= 0 and below 2^63")
     return Generator(PCG64(SeedSequence(seed, spawn_key=(trial, crc32(name.encode())))))
 
 

@@ -69,6 +69,8 @@ def keys(model: type[BaseModel], prefix: str = "") -> Iterator[str]:
 def suggestion(key: str, model: type[BaseModel], siblings: list[str]) -> str:
     """What the unknown dotted `key` may have meant: a similar one beside it, or the same name elsewhere."""
     *above, name = key.split(".")
+    if key in keys(model):  # of the kind that stands there it is not
+        return f"only another kind has it; there are {', '.join(siblings)}"
     near = [".".join([*above, close]) for close in get_close_matches(name, siblings, n=1)]
     if not near:
         everywhere = list(dict.fromkeys(keys(model)))

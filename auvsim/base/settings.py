@@ -1,9 +1,17 @@
 """Base class of all settings: frozen, strict, documented field by field; and choice among several by `kind`."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Iterator
 from typing import Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, ValidationInfo, field_validator
+
+# Largest size of any setting by its unit, far beyond what a vehicle may meet and well within what numbers can hold;
+# clocks may be ahead by an epoch. What is not 0 is at least TINY of such a unit.
+LARGEST = {"m": 1e6, "m/s": 100.0, "deg": 3600.0, "deg/s": 3600.0, "Hz": 1e5, "rpm": 1e6, "s": 1e10, "-": 1e6}
+OTHERWISE = 1e12
+TINY = 1e-9
+_UNIT = re.compile(r"\[([^\]]+)\][^\[]*$")  # the last one of a description
 
 
 class Settings(BaseModel):
@@ -15,6 +23,30 @@ class Settings(BaseModel):
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    @field_validator("*", mode="after")
+    @classmethod
+    def _of_a_possible_size(cls, value: Any, info: ValidationInfo) -> Any:
+        """Refuses numbers that no quantity of the field's unit has."""
+        field = cls.model_fields.get(info.field_name or "")
+        found = _UNIT.search(field.description or "") if field else None
+        unit = found.group(1) if found else ""
+        largest, smallest = LARGEST.get(unit, OTHERWISE), TINY if unit in LARGEST else 0.0
+        for number in _floats(value):
+            if abs(number) > largest:
+                raise ValueError(f"{number:g} should be at most {largest:g} in size{f' [{unit}]' if unit else ''}")
+            if 0.0 < abs(number) < smallest:
+                raise ValueError(f"{number:g} should be 0 or at least {smallest:g} in size [{unit}]")
+        return value
+
+
+def _floats(value: Any) -> Iterator[float]:
+    """The numbers of a value, those in tuples included."""
+    if isinstance(value, float):
+        yield value
+    elif isinstance(value, tuple):
+        for item in value:
+            yield from _floats(item)
 
 
 class OwnPart(Settings):

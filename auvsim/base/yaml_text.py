@@ -26,6 +26,8 @@ _CORE_SCHEMA = [
     ),
 ]
 
+MOST = 200_000  # values of a document; the largest scenario has some thousands
+
 
 class _Loader(yaml.SafeLoader):
     yaml_implicit_resolvers: dict = {}  # noqa: RUF012 (PyYAML fills this class attribute)
@@ -75,6 +77,7 @@ def read(text: str, source: str = "YAML") -> Document:
         node = loader.get_single_node()
         if node is None:
             return Document(value=None, places={})
+        _count(node, {}, source)
         places = {path: f"{source}:{line}" for path, line in _lines(node, "", source)}
         return Document(value=loader.construct_document(node), places=places)
     except yaml.MarkedYAMLError as error:
@@ -84,7 +87,7 @@ def read(text: str, source: str = "YAML") -> Document:
     except (yaml.YAMLError, ValueError) as error:
         raise InputError(f"{source}: not YAML: {' '.join(str(error).split())}") from None
     except RecursionError:
-        raise InputError(f"{source}: not YAML: a value contains itself") from None
+        raise InputError(f"{source}: not YAML: values are nested too deeply") from None
 
 
 def load(path: Path) -> Document:
@@ -108,6 +111,31 @@ def dump(value: Any, *, flow: bool = False) -> str:
         value, Dumper=_Dumper, sort_keys=False, default_flow_style=flow, allow_unicode=True, width=1_000_000
     )
     return text.removesuffix("...\n").strip() if flow else text
+
+
+def _count(node: yaml.Node, counts: dict[int, int], source: str) -> int:
+    """Number of values below a node, each alias counted as what it stands for.
+
+    Args:
+        node: where to begin.
+        counts: of the nodes seen so far, by identity; 0 for those that are being counted.
+        source: names the text in errors.
+
+    Raises:
+        InputError: a value contains itself, or there are more than MOST.
+    """
+    if id(node) in counts:
+        if not counts[id(node)]:
+            raise InputError(f"{source}:{node.start_mark.line + 1}: not YAML: a value contains itself")
+        return counts[id(node)]
+    counts[id(node)], total = 0, 1
+    below = node.value if isinstance(node, yaml.SequenceNode | yaml.MappingNode) else []
+    for item in below:
+        total += sum(_count(part, counts, source) for part in (item if isinstance(item, tuple) else (item,)))
+    if total > MOST:
+        raise InputError(f"{source}:{node.start_mark.line + 1}: more than {MOST} values, aliases written out")
+    counts[id(node)] = total
+    return total
 
 
 def _lines(node: yaml.Node, path: str, source: str) -> Iterator[tuple[str, int]]:

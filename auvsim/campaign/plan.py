@@ -31,7 +31,7 @@ class Stop(Settings):
     width: float = Field(
         gt=0.0, lt=1.0, description="width of the 95 % interval of each variant's success rate that suffices"
     )
-    block: int = Field(default=100, ge=1, description="trials of each variant between two looks at it")
+    block: int = Field(default=100, ge=1, le=10_000_000, description="trials of each variant between two looks at it")
 
 
 class PlanSettings(Settings):
@@ -42,8 +42,10 @@ class PlanSettings(Settings):
         pattern=r"^[^./\\:\x00-\x1f][^/\\:\x00-\x1f]{0,99}$",
         description="what the report and its folder in out/ call it; a name, not a path",
     )
-    seed: int = Field(default=0, ge=0, description="seed of every random number of every trial")
-    trials: int = Field(default=100, ge=1, description="trials of each variant; at most, if there is a `stop`")
+    seed: int = Field(default=0, ge=0, lt=2**63, description="seed of every random number of every trial")
+    trials: int = Field(
+        default=100, ge=1, le=10_000_000, description="trials of each variant; at most, if there is a `stop`"
+    )
     stop: Stop | None = Field(default=None, description="when to stop earlier")
     success: Criterion | None = Field(
         default=None,

@@ -1,7 +1,10 @@
 """The command `auvsim`."""
 
+import logging
+import math
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,9 +12,10 @@ from typing import Annotated, Literal
 
 import tyro
 
-from auvsim import __version__
-from auvsim.base.errors import AuvsimError, InputError
+from auvsim import CACHE_NOTE, RENDERER_NOTE, __version__
+from auvsim.base.errors import AuvsimError, DrawingError, InputError
 from auvsim.base.neighbours import check_estimators
+from auvsim.cli.interruption import Interruption
 from auvsim.cli.parsing import parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
@@ -181,11 +185,13 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fits the planar model's parameters to logs of manoeuvres and judges them on one that is held out.
+    """Fits the model of motion that predicts best to logs of manoeuvres, and judges it on what is held out.
 
-    Writes report.html, report.png and, if they predict better than those it started from, parameters.yaml, which
-    --estimator.model of `auvsim dock` takes. A log is a trial's, or a CSV or NetCDF file with named columns such as
-    `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading clockwise from north.
+    Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model
+    of `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle)
+    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with
+    named columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
+    clockwise from north.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LOG...")]
@@ -196,12 +202,24 @@ class Identify:
     """Logs to judge by; by default the least informative kind of manoeuvre."""
     columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
     """Meaning of columns, where their names do not say it: `rudder: {column: d, unit: deg, sign: -1}`."""
-    vehicle: str = "remus100"
-    """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit starts."""
+    vehicle: str | None = None
+    """Vehicle in models/, or the path of its MJCF file: its masses, and where the fit of the planar model starts."""
+    length: float | None = None
+    """Length of the hull [m]; with beam, draught and mass it says what is known of the motion before the logs."""
+    beam: float | None = None
+    """Beam of the hull [m]."""
+    draught: float | None = None
+    """Draught of the hull, of a submerged body half its height [m]."""
+    mass: float | None = None
+    """Mass of the vehicle [kg]."""
+    quick: bool = False
+    """Fewer structures and steps on a coarser grid: some seconds."""
     name: str | None = None
     """Also keep the parameters under this name, in models/<vehicle>/planar/."""
+    motion: bool = False
+    """Also choose a motion model of a known vehicle, which then takes longer; for an unknown one it always does."""
     steps: tuple[str, ...] = ()
-    """Some of least-squares, segments, prediction-error; by default all."""
+    """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -266,17 +284,60 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if arguments == ["--version"]:
         print(f"auvsim {__version__}")
         return 0
-    try:
-        return _run(arguments)
-    except AuvsimError as error:
-        print(f"auvsim: {' '.join(str(error).split())}", file=sys.stderr)
-        return error.exit_code
-    except KeyboardInterrupt:
-        print("auvsim: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:  # the reader, such as `head`, has what it wanted
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+    logging.getLogger("absl").setLevel(logging.ERROR)  # MuJoCo's warnings; what comes of them is said in one line
+    if CACHE_NOTE:
+        print(f"auvsim: {CACHE_NOTE}", file=sys.stderr)
+    with Interruption() as interruption:
+        try:
+            return _run(arguments)
+        except AuvsimError as error:
+            more = f"; {RENDERER_NOTE}" if isinstance(error, DrawingError) and RENDERER_NOTE else ""
+            print(f"auvsim: {' '.join(str(error).split())}{more}", file=sys.stderr)
+            return error.exit_code
+        except KeyboardInterrupt:
+            pass
+        except BrokenPipeError:  # the reader, such as `head`, has what it wanted
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except OSError as error:  # a full disk, a file that may not be read
+            if not interruption.came:
+                print(f"auvsim: {_of_a_file(error)}", file=sys.stderr)
+                return 2
+        except MemoryError as error:
+            print(f"auvsim: out of memory: {' '.join(str(error).split())}".rstrip(": "), file=sys.stderr)
+            return 1
+        except Exception as error:
+            folder = _cache_at_fault(error)
+            if folder and not interruption.came:
+                text = " ".join(str(error).split())[:200]
+                print(
+                    f"auvsim: compiled code in {folder} cannot be read ({type(error).__name__}: {text}); delete its "
+                    ".nbi and .nbc files, or set NUMBA_CACHE_DIR to another folder",
+                    file=sys.stderr,
+                )
+                return 1
+            if not interruption.came:
+                raise
+    print("auvsim: interrupted", file=sys.stderr)
+    return 130
+
+
+def _cache_at_fault(error: BaseException) -> str | None:
+    """The folder of compiled code, if that is what an error is about."""
+    for frame, _ in traceback.walk_tb(error.__traceback__):
+        if Path(frame.f_code.co_filename).parts[-3:] == ("numba", "core", "caching.py"):
+            place = getattr(frame.f_locals.get("self"), "_cache_path", None)
+            if place is not None:
+                return str(place)
+    return None
+
+
+def _of_a_file(error: OSError) -> str:
+    """What is wrong with a file, in one line."""
+    names = [str(name) for name in (error.filename, error.filename2) if name is not None]
+    name = names[-1] if names else type(error).__name__
+    shown = name if len(name) <= 200 else f"{name[:197]}..."
+    return f"{shown}: {' '.join((error.strerror or str(error)).split())}"
 
 
 def _run(arguments: list[str]) -> int:
@@ -343,7 +404,8 @@ def _run(arguments: list[str]) -> int:
 
         return identify.run(
             command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
-            vehicle=command.vehicle, name=command.name, steps=command.steps,
+            vehicle=command.vehicle, name=command.name, steps=command.steps, quick=command.quick,
+            hull=(command.length, command.beam, command.draught, command.mass), motion=command.motion,
         )  # fmt: skip
 
     if isinstance(command, Estimate):
@@ -368,6 +430,10 @@ def _run(arguments: list[str]) -> int:
 
     from auvsim.cli import products
 
+    if isinstance(command, Video):
+        for name, value in (("time", command.time), ("speed", command.speed)):
+            if value is not None and not (math.isfinite(value) and value >= 0.0):
+                raise InputError(f"command line: --{name} {value:g}: give a finite number that is not negative")
     match command:
         case Video(still=None):
             if command.time is not None:

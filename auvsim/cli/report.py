@@ -34,14 +34,15 @@ class ProgressState(Protocol):
 
 
 class _Bar:
-    """A bar on standard error that goes away when done; nothing where there is no terminal."""
+    """A bar on standard error that goes away when done; where there is no terminal, a line now and then."""
 
     def __init__(self, name: str) -> None:
         console = Console(stderr=True)
         columns = (TextColumn(name), BarColumn(), TextColumn("{task.fields[text]}"), TimeElapsedColumn())
         self._progress = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
         self._task = self._progress.add_task(name, total=None, text="")
-        self._next = 0.0
+        self._name, self._lines = name, not console.is_terminal
+        self._next = time.monotonic() + LINE_PERIOD if self._lines else 0.0
 
     def __enter__(self) -> Any:
         self._progress.start()
@@ -52,7 +53,11 @@ class _Bar:
 
     def _show(self, done: float, total: float, text: str) -> None:
         now = time.monotonic()
-        if now >= self._next or done >= total:
+        if self._lines:
+            if now >= self._next:
+                self._next = now + LINE_PERIOD
+                print(f"{self._name}: {' '.join(text.split())}", file=sys.stderr, flush=True)
+        elif now >= self._next or done >= total:
             self._next = now + PERIOD
             self._progress.update(self._task, completed=done, total=total, text=text)
 

@@ -28,13 +28,18 @@ def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, na
     if status == "interrupted":
         print(f"auvsim: interrupted; {path} holds the run up to there", file=sys.stderr)
         return 130
-    values = products.summary(log, out)
-    if status == "diverged":
-        print(f"auvsim: {diagnosis(log)}; {path} holds the run up to there", file=sys.stderr)
-        return 1
-    products.plots(log, out)
-    if video:
-        _video(log, out)
+    try:
+        values = products.summary(log, out)
+        if status == "diverged":
+            print(f"auvsim: {diagnosis(log)}; {path} holds the run up to there", file=sys.stderr)
+            return 1
+        products.plots(log, out)
+        if video:
+            _video(log, out)
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        again = "`auvsim metrics`, `auvsim plot` and `auvsim video` make the rest from it"
+        raise InputError(f"{error.filename or out}: cannot be written: {reason}; {path} is whole, {again}") from None
     report.show(values)
     return 0
 
@@ -53,13 +58,13 @@ def output_folder(path: Path) -> Iterator[None]:
     Raises:
         InputError: If it is no folder or cannot be written to.
     """
-    new = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
+        new = [folder for folder in (path, *path.parents) if not folder.exists()]
         path.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=path):
             pass
     except OSError as error:
-        reason = "it is a file, not a folder" if path.is_file() else (error.strerror or str(error)).lower()
+        reason = "it is a file, not a folder" if _is_file(path) else (error.strerror or str(error)).lower()
         raise InputError(f"{path}: cannot be written to: {reason}; give another folder with --out") from None
     try:
         yield
@@ -68,6 +73,13 @@ def output_folder(path: Path) -> Iterator[None]:
             if not any(folder.iterdir()):
                 folder.rmdir()
         raise
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # its name is too long, or a folder above it may not be read
+        return False
 
 
 def simulate(scenario: Scenario, seed: int, trial: int, name: str, path: Path) -> Log:

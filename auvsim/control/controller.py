@@ -28,7 +28,11 @@ class ControllerSetup:
 
 
 class Controller(Protocol):
-    """Turns setpoints into demands by the readings of the sensors on board; made by `Class(setup)`."""
+    """Turns setpoints into demands by the readings of the sensors on board; made by `Class(setup)`.
+
+    It may have a property `warning`, a line that says what it cannot hold with all its authority, or None; the run logs
+    an event `authority` when one begins.
+    """
 
     @property
     def heading(self) -> float | None:

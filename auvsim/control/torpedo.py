@@ -12,6 +12,7 @@ from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
 from auvsim.control.controller import ControllerSetup, Setpoints
+from auvsim.control.trim import Trim
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 
 
@@ -30,6 +31,12 @@ class AutopilotSettings(Settings):
     )
     depth_gain: float = Field(default=0.12, gt=0, description="pitch per depth error [rad/m]")
     depth_integral_gain: float = Field(default=0.003, ge=0, description="pitch per integrated depth error [rad/(m s)]")
+    trim: bool = Field(
+        default=True, description="whether pitch is trimmed, with speed, once a depth error stays, as of net buoyancy"
+    )
+    trim_gain: float = Field(
+        default=0.006, ge=0, description="pitch per integrated depth error of that trim at 1 m/s [rad/(m s)]"
+    )
     pitch_limit_deg: float = Field(default=20.0, gt=0, le=45, description="largest commanded pitch [deg]")
 
 
@@ -54,6 +61,7 @@ class Autopilot:
         self._heading, self._pitch = AlphaBeta.of_index(0.03, angle=True), AlphaBeta.of_index(0.03, angle=True)
         self._depth = AlphaBeta.of_index(0.004)
         self._integral = 0.0
+        self._trim = Trim(self._settings.trim_gain, self._pitch_limit, self._period)
         self._speed: float | None = None  # through the water, by dead reckoning from the commands [m/s]
         self._shaft: tuple[float, float] = (math.nan, 0.0)  # the last speed and its shaft speed
 
@@ -77,6 +85,13 @@ class Autopilot:
         """Smoothed depth [m], None before the first reading."""
         return self._depth.value
 
+    @property
+    def warning(self) -> str | None:
+        """What the vehicle cannot hold with all its authority; None if there is nothing."""
+        if not self._trim.helpless:
+            return None
+        return f"the largest pitch of {self._settings.pitch_limit_deg:g} deg does not bring it to its depth"
+
     def command(self, setpoints: Setpoints) -> Commands:
         """The demand now; a rudder among the setpoints is passed on as it is, in place of heading control."""
         heading, depth, speed, rudder = setpoints
@@ -87,12 +102,15 @@ class Autopilot:
             return Commands(0.0, 0.0, shaft_speed)
         holding = s.heading_gain * wrap(heading - self._heading.value) - s.yaw_rate_gain * self._heading.rate
         error = depth - self._depth.value
-        wanted = -(s.depth_gain * error + s.depth_integral_gain * self._integral)
+        steady = self._trim.pitch(self._speed) if self._trim.begun else s.depth_integral_gain * self._integral
+        wanted = -(s.depth_gain * error + steady)
         pitch = max(-self._pitch_limit, min(self._pitch_limit, wanted))
         # Positive stern plane dives. The integral is frozen while pitch is limited or the depth error is large.
         elevator = s.pitch_gain * (self._pitch.value - pitch) + s.pitch_rate_gain * self._pitch.rate
         if abs(error) < 0.5 and pitch == wanted:
             self._integral += error * self._period
+        if s.trim:
+            self._trim.update(depth, error, self._speed, pitch != wanted, s.depth_integral_gain * self._integral)
         if self._speed < 0.0:  # fins act the other way round when the flow comes from astern
             holding, elevator = -s.astern_factor * holding, -elevator
         rudder = holding if rudder is None else rudder

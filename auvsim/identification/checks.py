@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from auvsim.base.errors import InputError
+from auvsim.identification import velocity_checks
 from auvsim.identification.columns import Meaning
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signals
@@ -19,6 +20,7 @@ LEAST = 20.0  # of data in all: the vehicle's surge alone takes some 10 s to set
 SPIN = 1.0  # a turn this fast is none of a vehicle's [rad/s]
 STILL = math.radians(0.3)  # a rudder that moves less than this excites nothing [rad]
 DEGREE = math.pi / 180.0
+RUDDER = math.radians(45.0)  # largest of vehicles of which nothing is known [rad]
 
 
 def not_empty(values: Array, quantity: str, column: str, path: Path) -> None:
@@ -53,33 +55,38 @@ def heading_unit(times: Array, heading: Array, meaning: Meaning, path: Path) -> 
         raise InputError(f"{where} wraps after {wraps / DEGREE:.2f} deg: these are radians; name it `heading [rad]`")
 
 
-def signals(found: Sequence[Signals], rudder_limit: float, shaft_limit: float) -> None:
-    """Refuses signals that no manoeuvre of the vehicle can be.
+def signals(found: Sequence[Signals], rudder_limit: float = RUDDER, shaft_limit: float | None = None) -> list[str]:
+    """Refuses signals that no manoeuvre of the vehicle can be; notes on what is doubtful.
 
     Args:
         found: All that was read.
         rudder_limit: Largest effective rudder of the vehicle [rad].
-        shaft_limit: Largest shaft speed [rad/s].
+        shaft_limit: Largest shaft speed [rad/s]; None: of the shaft nothing is known.
 
     Raises:
         InputError: Too little, nothing that moves, or a unit that cannot be.
     """
     if not found:
         raise InputError("no manoeuvre was found; each needs rudder and shaft speed together for some minutes")
+    notes = []
     for one in found:
         _inputs(one, rudder_limit, shaft_limit)
         _heading_and_gyro(one)
         _speeds_and_positions(one)
+        notes += velocity_checks.check(one)
+    return notes
 
 
-def _inputs(one: Signals, rudder_limit: float, shaft_limit: float) -> None:
+def _inputs(one: Signals, rudder_limit: float, shaft_limit: float | None) -> None:
     rudder, shaft = one.signals["rudder"].values, one.signals["shaft_speed"].values
     largest = float(np.abs(rudder).max())
     if largest > 1.0 and largest > 3.0 * rudder_limit:
         raise InputError(
-            f"{one.name}: the rudder reaches {largest:.3g} rad, the vehicle's {rudder_limit:.2g} rad: "
+            f"{one.name}: the rudder reaches {largest:.3g} rad, a vehicle's {rudder_limit:.2g} rad: "
             "these are degrees; name the column `rudder [deg]`"
         )
+    if shaft_limit is None:
+        return
     fastest = float(np.abs(shaft).max())
     if fastest > 1.5 * shaft_limit:
         raise InputError(

@@ -60,6 +60,8 @@ QUANTITIES: dict[str, Quantity] = {
     "sway": Quantity("speed", "sway v water_sway dvl_water_v v_water", "dvl log"),
     "ground_surge": Quantity("speed", "ground_surge dvl_u u_ground dvl_bottom_u bottom_surge", "dvl"),
     "ground_sway": Quantity("speed", "ground_sway dvl_v v_ground dvl_bottom_v bottom_sway", "dvl"),
+    "velocity_north": Quantity("speed", "velocity_north v_north vel_north vn", "gps dvl"),
+    "velocity_east": Quantity("speed", "velocity_east v_east vel_east ve", "gps dvl"),
     "north": Quantity("length", "north northing pos_north position_north", "position usbl gps"),
     "east": Quantity("length", "east easting pos_east position_east", "position usbl gps"),
     "latitude": Quantity("place", "latitude lat", "position gps"),
@@ -67,6 +69,10 @@ QUANTITIES: dict[str, Quantity] = {
     "pitch": Quantity("angle", "pitch theta pitch_angle", "compass imu ahrs"),
     "current_north": Quantity("speed", "current_north current_n", "current"),
     "current_east": Quantity("speed", "current_east current_e", "current"),
+    "wind_forward": Quantity("speed", "wind_forward apparent_wind_forward", "wind anemometer"),
+    "wind_starboard": Quantity("speed", "wind_starboard apparent_wind_starboard", "wind anemometer"),
+    "wind_speed": Quantity("speed", "wind_speed apparent_wind_speed aws", "wind anemometer"),
+    "wind_from": Quantity("angle", "wind_from apparent_wind_angle awa", "wind anemometer"),
     "manoeuvre": Quantity("text", "manoeuvre maneuver manoeuver run segment test trial"),
 }
 _BY_ALIAS = {alias: name for name, quantity in QUANTITIES.items() for alias in quantity.aliases.split()}

@@ -23,20 +23,20 @@ from estimators.planar.model import PARAMETER_NAMES, accelerations, step_functio
 @lru_cache
 def segments() -> ModuleType:
     """The functions of `segment_loops`, compiled at their first call."""
-    return _load("planar_segments", _linearise(), segment_loops)
+    return load_behind("planar_segments", _linearise(), segment_loops)
 
 
 @lru_cache
 def information() -> ModuleType:
     """The functions of `information_loops`, which build on those of `segment_loops`, compiled at their first call."""
-    return _load("planar_information", _linearise(), segment_loops, information_loops)
+    return load_behind("planar_information", _linearise(), segment_loops, information_loops)
 
 
 @lru_cache
 def filters() -> ModuleType:
     """The functions of `filter_loops`, on the step that the docking filters take, compiled at their first call."""
     arguments = ("x", "u", "p", "h"), ("following", "F")
-    return _load(
+    return load_behind(
         "planar_record_filter", python_source(step_function(), "step", *arguments, scalars=("h",)), filter_loops
     )
 
@@ -53,7 +53,8 @@ def _linearise() -> str:
     return python_source(function, "linearise", ("nu", "u", "p"), ("l", "A", "B"))
 
 
-def _load(name: str, model: str, *behind: ModuleType) -> ModuleType:
+def load_behind(name: str, model: str, *behind: ModuleType) -> ModuleType:
+    """A module of the model's source with the loops of other modules behind it."""
     loops_hash = hashlib.sha256(inspect.getsource(loops).encode()).hexdigest()[:16]
     comment = f"# Machine code made of this depends on Python {platform.python_version()}, numba {numba.__version__}"
     imports = "import math\n\nfrom estimators.core.compiling import compiled"

@@ -98,18 +98,18 @@ def with_values(parameters: PlanarParameters, names: Sequence[str], values: Arra
     return replace(parameters, **dict(zip(names, np.asarray(values, dtype=float).tolist(), strict=True)))
 
 
-def free_indices(free: Sequence[str]) -> Indices:
-    """Places (k,) of the free parameters among PARAMETER_NAMES.
+def free_indices(free: Sequence[str], names: Sequence[str] = PARAMETER_NAMES) -> Indices:
+    """Places (k,) of the free parameters among `names`, the planar model's if none are given.
 
     Raises:
         InputError: A name is unknown or twice there, or there is none.
     """
     for name in free:
-        if name not in PARAMETER_NAMES:
-            raise unknown_name("parameter of the planar model", name, list(PARAMETER_NAMES))
+        if name not in names:
+            raise unknown_name("parameter of the planar model", name, list(names))
     if not free or len(set(free)) < len(free):
         raise InputError(f"free parameters {', '.join(free) or '(none)'}: name at least one, and each once")
-    return np.array([PARAMETER_NAMES.index(name) for name in free])
+    return np.array([names.index(name) for name in free])
 
 
 def check(records: Sequence[Record], start: PlanarParameters) -> None:

@@ -98,7 +98,10 @@ def part(record: Record, first: int, stop: int) -> Record:
     """Samples `first` to `stop` of a record."""
     times, rows = record.times[first:stop], slice(first, stop)
     name = f"{record.name}, {times[0]:.0f} to {times[-1]:.0f} s"
-    return replace(record, name=name, times=times, inputs=record.inputs[rows], measured=record.measured[rows])
+    wind = None if record.wind is None else record.wind[rows]
+    return replace(
+        record, name=name, times=times, inputs=record.inputs[rows], measured=record.measured[rows], wind=wind
+    )
 
 
 def judge(record: Record, start: PlanarParameters, fit: PlanarParameters) -> HoldoutResult:

@@ -21,7 +21,7 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.core.consistency import chi_square
 from estimators.docking.models import steady_surge
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import SURGE_LIMIT, PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
 LENGTH = 20.0  # of the segments fitted [s]
@@ -29,6 +29,9 @@ PRIOR = 0.5  # relative standard deviation of the prior about the start, where t
 PROBABILITY = 0.95
 PROFILED = 4  # weak parameters whose likelihood is followed: each takes some dozens of fits
 NOISY = 1.1  # residuals beyond this many deviations show noise of the process
+LACKING = 2.0  # residuals beyond this many show what the model lacks: then the deviations bear it too
+REWEIGHTED = 3  # times at most
+STEP_MARGIN = 0.03  # by which an earlier step must predict the fitted records better than the last to be kept instead
 NAMES = tuple(name.replace("_", " ") for name in MEASURED)
 
 
@@ -55,11 +58,12 @@ class Identification:
     judged: tuple[HoldoutResult, ...]  # of each held-out record
     verdicts: tuple[Verdict, ...]
     readings: Readings
+    kept: int = -1  # which of the fits is the result
 
     @property
     def fit(self) -> Fit:
-        """That of the last step."""
-        return self.fits[-1]
+        """That of the step which is kept."""
+        return self.fits[self.kept]
 
     @property
     def start(self) -> PlanarParameters:
@@ -122,16 +126,18 @@ def identify(
     if not judging:
         records, judging, said = judgement.choose(records)
     checks.records(records, start)
-    fits, prior_on, notes = _fits(records, start, free, steps, say)
-    fit = fits[-1]
+    fits, weighed, prior_on, notes = _fits(records, start, free, steps, say)
+    kept, why = _kept(records, start, fits)
+    notes += why
+    fit = fits[kept]
     assessed = assess(_by_data_alone(fit, prior_on) if prior_on else fit)
-    intervals, profiled = _intervals(records, fits, assessed, say)
+    intervals, profiled = _intervals(weighed, fits, fit, assessed, say)
     say("predicting what was held out", 0.95)
     judged = tuple(judgement.judge(record, start, fit.parameters) for record in judging)
     draft = Identification(
         vehicle=vehicle, speed=speed, start_text=start_text, fitted=tuple(records), fits=tuple(fits),
         identifiability=assessed, intervals=intervals, profiled=profiled, judged=judged, verdicts=(),
-        readings=_joined(readings, holdout),
+        readings=_joined(readings, holdout), kept=kept,
     )  # fmt: skip
     verdicts = (*_verdicts(draft), Verdict(good="would say more" not in said, text=said), *notes)
     say("done", 1.0)
@@ -155,7 +161,7 @@ def _speed(records: Sequence[Record], vehicle: str) -> float:
     if not records:
         return 1.0
     shaft = float(np.mean(np.concatenate([r.inputs[:, 1] for r in records])))
-    limit = library.vehicle(vehicle).shaft_limit
+    limit = library.vehicle(vehicle).actuation.shaft_limit
     return float(np.clip(steady_surge(fit_planar_model(vehicle, 1.0).parameters, min(shaft, limit)), 0.2, 10.0))
 
 
@@ -165,8 +171,12 @@ def _fits(
     free: Sequence[str],
     steps: Sequence[str],
     say: Callable[[str, float], None],
-) -> tuple[list[Fit], tuple[str, ...], list[Verdict]]:
-    """The fit of each step, each from the one before; parameters whose start was prior_on, and what that means."""
+) -> tuple[list[Fit], Sequence[Record], tuple[str, ...], list[Verdict]]:
+    """The fit of each step, each from the one before; and what segments found on the way.
+
+    That is the records as they are weighed, the parameters with a prior about the start, and verdicts that say so.
+    """
+    weighed: Sequence[Record] = records
     fits: list[Fit] = []
     notes: list[Verdict] = []
     prior_on: tuple[str, ...] = ()
@@ -175,7 +185,7 @@ def _fits(
         fits.append(fit_least_squares(records, start, free))
     if "segments" in steps:
         say("segments", 0.1)
-        found = fit_segments(records, start, free, SegmentOptions(length=LENGTH, signs=True))
+        found, weighed = _reweighted(records, start, free)
         blind = assess(found).blind
         if blind or not found.converged:
             prior_on = tuple(dict.fromkeys(name for c in blind for name in c.named)) if found.converged else tuple(free)
@@ -183,14 +193,51 @@ def _fits(
             text = f"the data alone {why}: a prior of {PRIOR:.0%} about the start was put on {', '.join(prior_on)}"
             notes.append(Verdict(good=False, text=f"{text}, and decides these"))
             options = SegmentOptions(length=LENGTH, signs=True, prior=PRIOR, prior_on=prior_on)
-            found = fit_segments(records, start, free, options)
+            found = fit_segments(weighed, start, free, options)
         fits.append(found)
     if "prediction error" in steps:
         say("prediction error", 0.3)
         guess = fits[-1].parameters if "segments" in steps else None
         held = PredictionErrorOptions(signs=True, prior=PRIOR if prior_on else None, prior_on=prior_on)
         fits.append(fit_prediction_error(records, start, free, held, guess=guess))
-    return fits, prior_on, notes
+    return fits, weighed, prior_on, notes
+
+
+def _reweighted(records: Sequence[Record], start: PlanarParameters, free: Sequence[str]) -> tuple[Fit, list[Record]]:
+    """The fit of segments, and the records with deviations that bear what the model lacks.
+
+    Signals that were filtered show less noise than a fit leaves; weighed by that alone, one sensor decides everything.
+    """
+    options = SegmentOptions(length=LENGTH, signs=True)
+    found, records = fit_segments(records, start, free, options), list(records)
+    for _ in range(REWEIGHTED):
+        if not np.nanmax(found.residual_rms) > LACKING:
+            break
+        factors = np.where(found.residual_rms > 1.0, found.residual_rms, 1.0)  # NaN: never measured
+        records = [replace(record, deviations=record.deviations * factors) for record in records]
+        found = fit_segments(records, start, free, options)
+    return found, records
+
+
+def _kept(records: Sequence[Record], start: PlanarParameters, fits: Sequence[Fit]) -> tuple[int, list[Verdict]]:
+    """Which step's fit predicts the fitted records best: the last, unless an earlier one is clearly better.
+
+    All have the same free parameters, so that none of them has the advantage on what it was fitted to.
+    """
+    long = [record for record in records if record.duration >= judgement.LEAST]
+    tried = [k for k, fit in enumerate(fits) if fit.method != "least squares"]
+    if len(tried) < 2 or not long:
+        return -1, []
+    errors = {}
+    for k in tried:
+        judged = [judgement.judge(record, start, fits[k].parameters) for record in long]
+        errors[k] = float(np.sqrt(np.mean([one.share**2 for one in judged])))
+    best = min(tried, key=lambda k: errors[k])
+    if errors[best] >= (1.0 - STEP_MARGIN) * errors[tried[-1]]:
+        return -1, []
+    text = f"kept: {fits[best].method}, which predicts the fitted records better ({errors[best]:.2%} of the distance "
+    text += f"run) than {fits[-1].method} ({errors[tried[-1]]:.2%})"
+    return best, [Verdict(good=True, text=text)]
 
 
 def _by_data_alone(fit: Fit, prior_on: Sequence[str]) -> Fit:
@@ -204,14 +251,17 @@ def _by_data_alone(fit: Fit, prior_on: Sequence[str]) -> Fit:
 
 
 def _intervals(
-    records: Sequence[Record], fits: Sequence[Fit], assessed: Identifiability, say: Callable[[str, float], None]
+    records: Sequence[Record],
+    fits: Sequence[Fit],
+    fit: Fit,
+    assessed: Identifiability,
+    say: Callable[[str, float], None],
 ) -> tuple[dict[str, tuple[float, float]], tuple[str, ...]]:
     """Intervals by curvature; of weak parameters by the ratio of likelihoods.
 
     Those are followed on segments, and widened as prediction errors widen the segments' deviations: each step of a
     profile is a whole fit, and a filter's takes minutes.
     """
-    fit = fits[-1]
     reach = math.sqrt(chi_square(PROBABILITY, 1))
     found = {
         name: (float(value - reach * sd), float(value + reach * sd))
@@ -258,6 +308,10 @@ def _verdicts(found: Identification) -> list[Verdict]:
             said.append(Verdict(good=False, text=f"on {judged.record.name} its start is better: {_shares(judged)}"))
     if not fit.converged:
         said.append(Verdict(good=False, text=f"the last step has not converged: {fit.message}"))
+    fastest = max(float(np.nanmax(np.abs(r.measured[:, [3, 6]]), initial=0.0)) for r in found.fitted)
+    if fastest > SURGE_LIMIT:
+        text = f"the planar model counts speeds beyond {SURGE_LIMIT:g} m/s as these; the data go to {fastest:.2g} m/s"
+        said.append(Verdict(good=False, text=text))
     said += _identifiable(found)
     coloured = [NAMES[c] for c, test in enumerate(fit.whiteness) if test is not None and test.probability < 0.01]
     if coloured:

@@ -22,6 +22,7 @@ def read(
     Args:
         paths: NetCDF logs of auvsim, or CSV and NetCDF files with named columns.
         vehicle: Name in models/, or the path of an MJCF file; a trial log's must be the same. Its limits are known.
+            None: any; then a table may lack the shaft speed.
         columns: A mapping file for the users' tables.
         step: Of the records' grid [s]; each rudder's own if None.
 
@@ -29,12 +30,13 @@ def read(
         InputError: One line with the file and what is wrong in it, and what would be right.
     """
     mapping = {} if columns is None else read_map(columns)
-    limits = library.vehicle(vehicle or "remus100")
+    limits = None if vehicle is None else library.vehicle(vehicle)
     found, notes, sources = [], [], []
     for path in paths:
         sources.append(Source(file=path.name, sha256=_hash(path)))
         ones, more = _signals(path, mapping, vehicle)
-        checks.signals(ones, limits.actuation.fin_limit, limits.actuation.shaft_limit)
+        known = () if limits is None else (limits.actuation.fin_limit, limits.actuation.shaft_limit)
+        more += checks.signals(ones, *known)
         notes += more
         for one in ones:
             records, more = signals.records(one, step)
@@ -47,11 +49,16 @@ def _signals(
     path: Path, mapping: dict[str, ColumnSettings], vehicle: str | None
 ) -> tuple[list[signals.Signals], list[str]]:
     if not is_trial_log(path):
-        return table_records.signals(path, mapping)
+        return table_records.signals(path, mapping, shaft=vehicle is not None)
     found, notes, model = log_records.signals(path)
     if vehicle is not None and model != vehicle:
         raise InputError(f"{path}: a log of '{model}', not of '{vehicle}'; give --vehicle {model}")
     return found, notes
+
+
+def models(paths: Sequence[Path]) -> set[str]:
+    """Vehicles of those of the files that are trial logs."""
+    return {log_records.signals(path)[2] for path in paths if is_trial_log(path)}
 
 
 def is_trial_log(path: Path) -> bool:

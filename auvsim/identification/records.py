@@ -22,6 +22,7 @@ class Record:
     deviations: Array  # (8,) assumed standard deviation of each [same units]
     current: Array | None = None  # (2,) north, east [m/s] where it is known; None: a nuisance parameter of the record
     kind: str = ""  # of the manoeuvre, where it is known
+    wind: Array | None = None  # (n, 2) apparent wind, air past the vehicle towards its bow and to starboard [m/s]
 
     @property
     def step(self) -> float:

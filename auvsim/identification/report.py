@@ -67,7 +67,7 @@ def html(found: Identification) -> str:
             origin=_origin(found),
             parameters=list(_parameters(found)),
             residuals=[row for row in residuals if not math.isnan(row[1])],  # of what was measured
-            states=_svg(states),
+            states=svg(states),
             track=_panel(lambda axes: pictures.track_panel(axes, judged), (6.0, 5.2)),
             growth=_panel(lambda axes: pictures.growth_panel(axes, found), (6.0, 5.2)),
             parameter_panel=_panel(lambda axes: pictures.parameter_panel(axes, found, numbers=False), (6.0, 5.8)),
@@ -79,10 +79,10 @@ def html(found: Identification) -> str:
 def _panel(draw: Callable[[Any], None], size: tuple[float, float]) -> Markup:
     figure = Figure(figsize=size, layout="constrained")
     draw(figure.subplots())
-    return _svg(figure)
+    return svg(figure)
 
 
-def _svg(figure: Figure) -> Markup:
+def svg(figure: Figure) -> Markup:
     """The figure as an element of the page, the same for the same numbers."""
     stream = io.StringIO()
     with matplotlib.rc_context({"svg.hashsalt": "auvsim", "svg.fonttype": "none", "font.family": "sans-serif"}):

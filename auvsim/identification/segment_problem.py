@@ -4,26 +4,27 @@ Unknowns are the free parameters, the nuisances of each record and the first sta
 eliminated segment by segment, so that the work grows linearly with the records.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Literal, NamedTuple
+from types import ModuleType
+from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.identification import compiled
 from auvsim.identification.constraints import bounded_step, has_inertia, limits, prior_information
-from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices, with_values
+from auvsim.identification.fit import Indices, Mask, Nuisances, free_indices
 from auvsim.identification.records import Record
 from auvsim.identification.states import substeps
 from estimators.core.types import Array
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
 
 Loss = Literal["squares", "huber", "cauchy"]
 LOSSES: tuple[Loss, ...] = ("squares", "huber", "cauchy")
 # Deviations about the smoothed state at which a segment's first state is held, so that one that a short segment does
 # not show stays where a vehicle can be; hundreds of times wider than what is measured.
-_FIRST = np.array([100.0, 100.0, 1.0, 1.0, 1.0, 1.0])
+FIRST = np.array([100.0, 100.0, 1.0, 1.0, 1.0, 1.0])
 _DAMPING = 1e-3  # first share of the diagonal; collinear combinations have eigenvalues of 1e-4 and less
 
 
@@ -40,6 +41,29 @@ class SegmentOptions:
     prior_on: tuple[str, ...] | None = None  # parameters with a prior; None: all
     max_iterations: int = 50
     tolerance: float = 1e-4  # stops where a step would lower half the sum of squares by less: a deviation's hundredth
+
+
+class Vector(Protocol):
+    """Parameters of any model that can be written out in the order of its names."""
+
+    def vector(self) -> Array:
+        """All values."""
+        ...
+
+
+class Equations(NamedTuple):
+    """A model whose motion is fitted."""
+
+    names: tuple[str, ...]  # of its parameters
+    loops: Callable[[], ModuleType]  # `segment_loops` behind its accelerations
+    admissible: Callable[[Array], bool]  # whether a vehicle can have these parameters
+
+
+PLANAR = Equations(
+    PARAMETER_NAMES,
+    compiled.segments,
+    lambda p: has_inertia(PlanarParameters(**dict(zip(PARAMETER_NAMES, p.tolist(), strict=True)))),
+)
 
 
 class _Cut(NamedTuple):
@@ -74,21 +98,27 @@ class Problem:
         options: How it is weighed.
         length: Of a segment [s].
         states: Of each record, (n, 12), round which first states lie.
+        equations: Of the model.
+        prior: Information (k, k) of a prior on the free parameters about the start; None: that of the options.
+        first: Deviations (6,) about the smoothed states at which first states are held.
     """
 
     def __init__(
         self,
         records: Sequence[Record],
-        start: PlanarParameters,
+        start: Vector,
         free: Sequence[str],
         options: SegmentOptions,
         length: float,
         states: Sequence[Array],
+        equations: Equations = PLANAR,
+        prior: Array | None = None,
+        first: Array = FIRST,
     ) -> None:
         self.free, self.options, self.start = tuple(free), options, start
-        self.indices = free_indices(free)
+        self.indices = free_indices(free, equations.names)
         self.low, self.high = limits(free, options.signs)
-        self._loops = compiled.segments()
+        self._loops, self._admissible = equations.loops(), equations.admissible
         self._vector = start.vector()
         self.cuts = [_cut(record, length, x) for record, x in zip(records, states, strict=True)]
         deviations = options.nuisances.vector()
@@ -98,7 +128,9 @@ class Problem:
             if record.current is not None:
                 self._expected[r, :2] = record.current
         self._trust = np.where(self.active, 1.0 / np.where(deviations > 0.0, deviations, 1.0) ** 2, 0.0)
-        self._prior = prior_information(self._vector[self.indices], free, options.prior, options.prior_on)
+        own = prior_information(self._vector[self.indices], free, options.prior, options.prior_on)
+        self._prior = np.diag(own) if prior is None else prior
+        self._held = 1.0 / first**2
         self.nuisances = np.where(self.active, np.array([x[-1, 6:] for x in states]), self._expected)
         self.nuisances[:, 2:] = 0.0
 
@@ -107,10 +139,11 @@ class Problem:
         p = self._vector.copy()
         p[self.indices] = values
         loss = LOSSES.index(self.options.loss)
-        cost = 0.5 * float(self._prior @ (values - self._vector[self.indices]) ** 2)
+        aside = values - self._vector[self.indices]
+        cost = 0.5 * float(aside @ self._prior @ aside)
         cost += 0.5 * float(np.sum(self._trust * (nuisances - self._expected) ** 2))
         normal_equations, residuals = [], []
-        if not has_inertia(with_values(self.start, self.free, values)):
+        if not self._admissible(p):
             cost = np.inf
         for cut, own, first in zip(self.cuts, nuisances, starts, strict=True):
             e = np.full(cut.measured.shape, np.nan)
@@ -120,9 +153,9 @@ class Problem:
                 loss, self.options.threshold, e,
             )  # fmt: skip
             away = cut.held - first
-            cost += part + 0.5 * float(np.sum((away / _FIRST) ** 2))
-            H[:, range(6), range(6)] += _FIRST**-2
-            g[:, :6] += away * _FIRST**-2
+            cost += part + 0.5 * float(np.sum(away**2 * self._held))
+            H[:, range(6), range(6)] += self._held
+            g[:, :6] += away * self._held
             normal_equations.append((H, g))
             residuals.append(e)
         return Point(values, nuisances, starts, cost, normal_equations, residuals)
@@ -136,8 +169,8 @@ class Problem:
         k = len(self.free)
         size = k + int(self.active.sum())
         total, gradient, back_substitution = np.zeros((size, size)), np.zeros(size), []
-        total[range(k), range(k)] += self._prior
-        gradient[:k] += self._prior * (self._vector[self.indices] - point.values)
+        total[:k, :k] += self._prior
+        gradient[:k] += self._prior @ (self._vector[self.indices] - point.values)
         for r, (H, g) in enumerate(point.normal_equations):
             part, descent, matrix, solved = self._loops.eliminate(H, g, damping)
             if not solved:

@@ -43,19 +43,19 @@ def fit_segments(
     _check_options(options)
     states = [smoothed(record, start, options.nuisances.vector()) for record in records]
     problem = Problem(records, start, free, options, options.length, states)
-    point, iterations, converged = _lowest(problem, states)
+    point, iterations, converged = _lowest(problem, start, states)
     if not np.isfinite(point.cost):
         raise InputError(f"record {records[0].name}: the model runs away from the start; give it shorter segments")
-    return _report(problem, point, iterations, converged)
+    return _report(problem, start, point, iterations, converged)
 
 
-def _lowest(problem: Problem, states: Sequence[Array]) -> tuple[Point, int, bool]:
+def _lowest(problem: Problem, start: PlanarParameters, states: Sequence[Array]) -> tuple[Point, int, bool]:
     """The lowest end from several starts, all their iterations, and whether it converged.
 
     No more are tried once noise explains an end, or two starts have come to the same.
     """
     point, iterations, converged = _down(problem, problem.start.vector()[problem.indices])
-    others = _other_starts(problem, states)
+    others = _other_starts(problem, start, states)
     while not converged or _unlikely(point):
         values, before = next(others, (None, 0))
         if values is None:
@@ -70,13 +70,13 @@ def _lowest(problem: Problem, states: Sequence[Array]) -> tuple[Point, int, bool
     return point, iterations, converged
 
 
-def _other_starts(problem: Problem, states: Sequence[Array]) -> Iterator[tuple[Array, int]]:
+def _other_starts(problem: Problem, start: PlanarParameters, states: Sequence[Array]) -> Iterator[tuple[Array, int]]:
     """Values (k,) of the free parameters from which to go down, and the iterations that they took."""
     options, records = problem.options, [cut.record for cut in problem.cuts]
-    values = first_values(records, states, problem.start, problem.free)
+    values = first_values(records, states, start, problem.free)
     yield values, 0
     length = _LONGER * options.length if math.isfinite(options.length) else _FROM_WHOLE
-    point, used, _ = _down(Problem(records, problem.start, problem.free, options, length, states), values)
+    point, used, _ = _down(Problem(records, start, problem.free, options, length, states), values)
     yield point.values, used
 
 
@@ -130,7 +130,7 @@ def _check_options(options: SegmentOptions) -> None:
         raise InputError(f"a weak prior of relative deviation {options.prior}; it must be positive, or None")
 
 
-def _report(problem: Problem, point: Point, iterations: int, converged: bool) -> Fit:
+def _report(problem: Problem, start: PlanarParameters, point: Point, iterations: int, converged: bool) -> Fit:
     k = len(problem.free)
     information, _, _ = problem.reduced(point, 0.0)
     covariance = invert(information)
@@ -143,8 +143,8 @@ def _report(problem: Problem, point: Point, iterations: int, converged: bool) ->
     limit = "" if converged else f"stopped after {iterations} iterations before it had converged"
     return Fit(
         method="segments",
-        start=problem.start,
-        parameters=with_values(problem.start, problem.free, point.values),
+        start=start,
+        parameters=with_values(start, problem.free, point.values),
         free=problem.free,
         covariance=covariance[:k, :k],
         nuisances=point.nuisances,

@@ -12,6 +12,7 @@ from auvsim.identification.records import MEASURED, Record
 from estimators.core.types import Array
 
 INPUTS = ("rudder", "shaft_speed")
+WIND = ("wind_forward", "wind_starboard")
 SHORTEST = 10.0  # spans shorter than this hold less than the vehicle's own time constants [s]
 GAP = 1.0  # missing inputs this long split a record; more slowly sampled ones at three of their intervals [s]
 STEPS = (0.05, 0.5)  # shortest and longest of a grid: a vehicle's yaw takes about a second [s]
@@ -153,9 +154,10 @@ def _gridded(signals: Signals, start: float, stop: float, step: float, name: str
         if quantity in given:
             measured[:, c], count = _moved(given[quantity], times, step)
             deviations[c] = signals.deviation(quantity) / math.sqrt(count)
+    wind = np.column_stack([_means(given[axis], times, step) for axis in WIND]) if WIND[0] in given else None
     return Record(
         name=name, times=times, inputs=inputs, measured=measured, deviations=deviations,
-        current=signals.current, kind=signals.kind,
+        current=signals.current, kind=signals.kind, wind=wind,
     )  # fmt: skip
 
 

@@ -41,14 +41,15 @@ class _Table(NamedTuple):
 
 
 def signals(
-    path: Path, mapping: Mapping[str, ColumnSettings], *, inputs: bool = True
+    path: Path, mapping: Mapping[str, ColumnSettings], *, shaft: bool = True, inputs: bool = True
 ) -> tuple[list[Signals], list[str]]:
     """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
 
     Args:
-        path: Of the file.
-        mapping: Which column is what, by quantity.
-        inputs: Whether rudder and shaft speed must be there.
+        path: CSV or NetCDF.
+        mapping: What columns mean, where their names do not say it.
+        shaft: Whether the shaft speed must be there; else its thrust counts as constant.
+        inputs: Whether rudder and shaft speed must be there at all.
 
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
@@ -62,12 +63,16 @@ def signals(
         for name, s in mapping.items()
         if s.constant is not None
     }
+    if not shaft and inputs and "shaft_speed" not in by_quantity:
+        constants.setdefault("shaft_speed", 0.0)
     _require(path, by_quantity.keys() | constants.keys(), list(columns), NEEDED if inputs else NEEDED[:1])
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
     time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
     table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time))
     notes = list(_assumptions(table, unknown))
+    if inputs and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
+        notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
     found = []
     pieces = list(_pieces(table))
     for number, piece in enumerate(pieces, start=1):
@@ -159,6 +164,7 @@ def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Si
         ends = np.array([piece.start, 0.5 * (piece.start + piece.stop), piece.stop])
         found[quantity] = Signal(times=ends, values=np.full(3, value))
     _combine(found)
+    _wind(found)
     lacking = [quantity for quantity in NEEDED[1:] if quantity not in found] if inputs else []
     if lacking:
         return None, [*notes, f"{label}: left out: no {' and no '.join(lacking)} in it"]
@@ -208,6 +214,13 @@ def _combine(found: dict[str, Signal]) -> None:
     """Puts what goes by other names under those of a record."""
     if "rudder" not in found and "rudder_command" in found:
         found["rudder"] = found["rudder_command"]
+    if {"velocity_north", "velocity_east", "heading"} <= found.keys() and "ground_surge" not in found:
+        north, east, heading = (found[name] for name in ("velocity_north", "velocity_east", "heading"))
+        across = np.interp(north.times, east.times, east.values)
+        turn = np.exp(-1j * np.interp(north.times, heading.times, heading.values))
+        body = (north.values + 1j * across) * turn
+        found["ground_surge"] = Signal(times=north.times, values=body.real)
+        found["ground_sway"] = Signal(times=north.times, values=body.imag)
     if {"latitude", "longitude"} <= found.keys() and "north" not in found:
         lat, lon = found["latitude"], found["longitude"]
         reach = math.radians(1.0) * EARTH
@@ -215,6 +228,18 @@ def _combine(found: dict[str, Signal]) -> None:
         found["north"] = Signal(times=lat.times, values=reach * (lat.values - lat.values[0]))
         narrowing = math.cos(math.radians(float(lat.values[0])))
         found["east"] = Signal(times=lat.times, values=reach * narrowing * across)
+
+
+def _wind(found: dict[str, Signal]) -> None:
+    """Turns speed and direction of the apparent wind, as an anemometer gives them, into its two components."""
+    if {"wind_speed", "wind_from"} <= found.keys():
+        speed, angle = found["wind_speed"], found["wind_from"]
+        turn = np.interp(speed.times, angle.times, np.unwrap(angle.values))
+        found["wind_forward"] = Signal(times=speed.times, values=-speed.values * np.cos(turn))
+        found["wind_starboard"] = Signal(times=speed.times, values=-speed.values * np.sin(turn))
+    if not {"wind_forward", "wind_starboard"} <= found.keys():
+        found.pop("wind_forward", None)
+        found.pop("wind_starboard", None)
 
 
 def _current(found: Mapping[str, Signal]) -> Array | None:

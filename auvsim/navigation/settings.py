@@ -15,7 +15,7 @@ class _Assumed(Settings):
         description="planar model: condense (fitted to MuJoCo's vehicle), a name in models/<vehicle>/planar/, a .yaml",
     )
     model_speed: float = Field(
-        default=1.0, gt=0, description="speed through the water at which the planar model is fitted [m/s]"
+        default=1.0, ge=0.05, le=20.0, description="speed through the water at which the planar model is fitted [m/s]"
     )
 
 
@@ -32,8 +32,8 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, regular_ekf, "
-        "module:factory",
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, "
+        "regular_ekf, module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")

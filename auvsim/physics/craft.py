@@ -17,6 +17,7 @@ from auvsim.base.frames import (
 )
 from auvsim.physics import water_slot
 from auvsim.physics.fluid import WATER
+from auvsim.physics.forces import DERIVED, HULL, STRIPS
 from auvsim.physics.truth import Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
@@ -61,6 +62,14 @@ class Craft:
             for channel, (joint, actuator) in enumerate(zip(joints, actuators, strict=True))
             if actuator.biasprm[1] == 0.0
         ]
+        hull = model.body(f"{name}/hull")
+        record, strips = hull.user, {**HULL, **DERIVED}
+        self._axis, self._place = data.xmat[hull.id, ::3], data.xpos[hull.id]
+        self._reach = float(record[strips["reach"][0]])
+        x, radius, half = (
+            record[strips[field][0] :][:STRIPS] for field in ("strip_x", "strip_radius", "strip_half_length")
+        )
+        self._strips = x[radius > 0.0], radius[radius > 0.0], half[radius > 0.0]
         self._rotation = np.zeros(9)
         self._matrix = self._rotation.reshape(3, 3)
 
@@ -94,6 +103,23 @@ class Craft:
         place = flip(self.position)
         water, above = current.evaluate(time, place), surface(current, time, place)
         water_slot.fill(self._water, time, self.position, water, above)
+
+    @property
+    def surfaced(self) -> bool:
+        """Whether any part of the hull is out of the water."""
+        water = self._water
+        if water[water_slot.SURFACE] == 0.0 or -self._place[2] + water[water_slot.ELEVATION] > self._reach:
+            return False
+        x, radius, half = self._strips
+        points = self._place + x[:, np.newaxis] * self._axis
+        rise = points[:, :2] - water[water_slot.PLACE :][:2]
+        level = water[water_slot.ELEVATION] + water[water_slot.ELEVATION + 1] * (
+            self._data.time - water[water_slot.TIME]
+        )
+        level = level + rise @ water[water_slot.ELEVATION + 2 : water_slot.WATER]
+        upright = self._axis[2] ** 2
+        extent = np.sqrt(radius * radius * (1.0 - upright) + half * half * upright)
+        return bool((level - points[:, 2] < extent).any())
 
     def truth(self, current: CurrentField) -> Truth:
         """The true state now, in NED and forward-starboard-down."""

@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 
 from auvsim.base.frames import Array
+from auvsim.water.terrain import GriddedFloor, SlopedFloor, Terrain
 
 WATER = (0.07, 0.27, 0.36)  # colour into which everything fades [rgb]
 TILE = 100.0  # side of the square after which the sea floor's pattern repeats [m]
@@ -18,12 +19,12 @@ SEA_FLOOR = "sea_floor"  # name of its geom
 METAL = (0.35, 0.38, 0.42, 1.0)
 
 
-def furnish(root: Any, sea_floor: float, center: Array) -> None:
+def furnish(root: Any, terrain: Terrain, center: Array) -> None:
     """Adds the sea floor (the geom `sea_floor`), light and water to a PyMJCF scene.
 
     Args:
         root: the scene.
-        sea_floor: its depth [m].
+        terrain: the sea floor; a grid's depths are put in by `shape_sea_floor` once the scene is compiled.
         center: (3,) point round which the scene is drawn, in MuJoCo's world [m].
     """
     root.visual.map.znear, root.visual.map.zfar = 0.002, 30.0  # of the extent
@@ -35,11 +36,11 @@ def furnish(root: Any, sea_floor: float, center: Array) -> None:
     root.visual.headlight.ambient, root.visual.headlight.diffuse = (0.38, 0.42, 0.44), (0.25, 0.27, 0.28)
     root.visual.headlight.specular = (0.1, 0.1, 0.1)
     root.visual.rgba.fog = root.visual.rgba.haze = (*WATER, 1.0)
-    _add_sea_floor(root, sea_floor)
+    _add_sea_floor(root, terrain)
     _add_light(root)
 
 
-def _add_sea_floor(root: Any, depth: float) -> None:
+def _add_sea_floor(root: Any, terrain: Terrain) -> None:
     """Squares of half a tile, so that the overview has a scale."""
     root.asset.add(
         "texture",
@@ -53,14 +54,34 @@ def _add_sea_floor(root: Any, depth: float) -> None:
     )
     repeat = 2.0 * HALF_WIDTH / TILE
     root.asset.add("material", name="sand", texture="sand", texrepeat=(repeat, repeat), specular=0, shininess=0)
-    root.worldbody.add(
-        "geom",
-        name=SEA_FLOOR,
-        type="plane",
-        size=(HALF_WIDTH, HALF_WIDTH, 10),
-        pos=(0, 0, -depth),
-        material="sand",
-    )
+    shape: dict[str, Any] = {"type": "plane", "size": (HALF_WIDTH, HALF_WIDTH, 10)}
+    if isinstance(terrain, GriddedFloor):
+        shape, place = _height_field(root, terrain)
+    else:
+        place = (0, 0, -terrain.depth(0.0, 0.0))
+    if isinstance(terrain, SlopedFloor):
+        shape["zaxis"] = (terrain.to_north, -terrain.to_east, 1.0)
+    root.worldbody.add("geom", name=SEA_FLOOR, pos=place, material="sand", **shape)
+
+
+def _height_field(root: Any, terrain: GriddedFloor) -> tuple[dict[str, Any], tuple[float, float, float]]:
+    """Shape and place of the geom of a gridded floor, whose asset is added: columns run north, rows run west."""
+    corner, (rows, columns) = terrain.corner, terrain.depths.shape
+    half = 0.5 * (rows - 1) * corner.to_north, 0.5 * (columns - 1) * corner.to_east
+    deepest = float(terrain.depths.max())
+    height = max(deepest - float(terrain.depths.min()), 1e-3)
+    root.asset.add("hfield", name=SEA_FLOOR, nrow=columns, ncol=rows, size=(*half, height, 10.0))
+    return {"type": "hfield", "hfield": SEA_FLOOR}, (corner.north + half[0], -corner.east - half[1], -deepest)
+
+
+def shape_sea_floor(model: mujoco.MjModel, terrain: Terrain) -> None:
+    """Puts the depths of a gridded floor into the compiled scene; any other is right already."""
+    if not isinstance(terrain, GriddedFloor):
+        return
+    field, deepest = model.hfield(SEA_FLOOR), float(terrain.depths.max())
+    heights = (deepest - terrain.depths.T[::-1]) / field.size[2]
+    at = int(field.adr[0])
+    model.hfield_data[at : at + heights.size] = heights.ravel()
 
 
 def _add_light(root: Any) -> None:

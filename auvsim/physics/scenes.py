@@ -19,13 +19,15 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, euler_to_quaternion, flip, flip_quaternion
 from auvsim.base.settings import Settings
 from auvsim.physics import hydrodynamics, scenery, soundness
+from auvsim.physics.ballast import BallastSettings, load, shift_buoyancy
 from auvsim.physics.fluid import WATER
 from auvsim.physics.forces import RECORD
 from auvsim.physics.truth import StructurePose
 from auvsim.vehicles import library
-from auvsim.water.terrain import FlatFloor, Terrain
+from auvsim.water.terrain import FlatSettings, Terrain, TerrainSettings, build_terrain
 
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
+GRAVITY = 9.81  # [m/s2], MuJoCo's default
 _NAME = re.compile(r"[A-Za-z0-9_.-]+")
 
 
@@ -36,8 +38,20 @@ class WorldSettings(Settings):
         default="implicitfast",
         description="MuJoCo's integrator; implicitfast is the fast default, RK4 the accurate one",
     )
-    water_density: float = Field(default=hydrodynamics.SEA_WATER, gt=0, description="density of the water [kg/m3]")
-    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
+    water_density: float = Field(
+        default=hydrodynamics.SEA_WATER, ge=900.0, le=1300.0, description="density of the water [kg/m3]"
+    )
+    sea_floor: float = Field(default=40.0, gt=0, le=12_000.0, description="depth of the sea floor [m]")
+    terrain: TerrainSettings = Field(default=FlatSettings(), description="Shape of the sea floor, by its `kind`.")
+
+    @property
+    def floor(self) -> Terrain:
+        """The sea floor.
+
+        Raises:
+            InputError: the file of a grid cannot be used.
+        """
+        return build_terrain(self.terrain, self.sea_floor)
 
 
 class Scene(NamedTuple):
@@ -55,6 +69,7 @@ def scene(
     structures: Mapping[str, tuple[str, StructurePose]],
     settings: WorldSettings,
     rate: float,
+    ballast: Mapping[str, BallastSettings] | None = None,
 ) -> Scene:
     """Scene of vehicles and structures, as `compose` makes it.
 
@@ -66,36 +81,49 @@ def scene(
         structures: model and pose of each structure, by instance name; models as `library.structure` takes them.
         settings: of what surrounds them.
         rate: physics steps per second [Hz].
+        ballast: of vehicles that are not as their models have them, by instance name.
 
     Raises:
         InputError: a name or model cannot be used, or MuJoCo refuses the scene.
     """
-    poses = {name: pose for name, (_, pose) in structures.items()}
+    poses, terrain = {name: pose for name, (_, pose) in structures.items()}, settings.floor
     for model in fleet.values():
         soundness.check(model, settings.water_density)
     composed = _composed(
         tuple((name, model, *library.source("vehicle", model)) for name, model in fleet.items()),
         tuple((name, model, *library.source("structure", model)) for name, (model, _) in structures.items()),
-        tuple(scenery.pillar_ends(settings.sea_floor, pose.depth, np.zeros(2)) is not None for pose in poses.values()),
+        tuple(_has_pillar(pose, terrain) for pose in poses.values()),
         settings,  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
         rate,
     )
     for name, pose in poses.items():
-        _check_depth(name, composed.structures[name], pose, settings)
+        _check_depth(name, composed.structures[name], pose, terrain)
     spec = composed.spec.copy()
-    spec.stat.center = _center(poses.values(), settings)
+    spec.stat.center = _center(poses.values(), terrain)
     for name, pose in poses.items():
         place, quaternion = _place(pose)
         for element in (spec.site(name), spec.body(f"{name}/")):
             element.pos, element.quat = place, quaternion
-        ends = _pillar(composed.structures[name], pose, settings)
+        ends = _pillar(composed.structures[name], pose, terrain)
         if ends is not None:
             spec.geom(_pillar_name(name)).fromto = ends
+    loads = {name: of for name, of in (ballast or {}).items() if not of.is_zero}
+    for name, of in loads.items():
+        shift_buoyancy(spec, name, of, _buoyancy(composed.vehicles[name], settings.water_density))
     try:
         model = spec.compile()
     except ValueError as error:
         raise _refused(error) from None
-    return Scene(model, composed.vehicles, composed.structures, poses, FlatFloor(settings.sea_floor))
+    for name, of in loads.items():
+        load(model, name, of)
+    scenery.shape_sea_floor(model, terrain)
+    return Scene(model, composed.vehicles, composed.structures, poses, terrain)
+
+
+def _buoyancy(vehicle: library.Vehicle, density: float) -> float:
+    """Buoyancy of a vehicle under water [N]."""
+    volume = vehicle.root.find("numeric", "hull_displaced_volume")
+    return GRAVITY * density * float(np.ravel(volume.data)[0])
 
 
 class _Composed(NamedTuple):
@@ -124,8 +152,9 @@ def _composed(
     vehicles = {name: library.vehicle(model) for name, model, _, _ in fleet}
     loaded = {name: library.structure(model) for name, model, _, _ in structures}
     # A depth that has room for a pillar, or has not, as the structure's own.
+    floor = settings.floor.depth(0.0, 0.0)
     poses = {
-        name: StructurePose(depth=settings.sea_floor - (2.0 * scenery.PILLAR_TOP if pillar else 0.0), heading=0.0)
+        name: StructurePose(depth=floor - (2.0 * scenery.PILLAR_TOP if pillar else 0.0), heading=0.0)
         for name, pillar in zip(loaded, pillars, strict=True)
     }
     root = compose(vehicles, {name: (loaded[name], poses[name]) for name in loaded}, settings, rate)
@@ -161,12 +190,13 @@ def compose(
     root.size.nuser_body, root.size.nuserdata = RECORD, WATER * len(vehicles)
     root.option.timestep, root.option.integrator = 1.0 / rate, settings.integrator
     root.option.flag.autoreset = "disable"  # a diverging simulation must be seen, not restarted
-    scenery.furnish(root, settings.sea_floor, _center([pose for _, pose in structures.values()], settings))
+    terrain = settings.floor
+    scenery.furnish(root, terrain, _center([pose for _, pose in structures.values()], terrain))
     for name, (structure, pose) in structures.items():
         structure.root.model = name
         place, quaternion = _place(pose)
         root.worldbody.add("site", name=name, pos=place, quat=quaternion, rgba=(0, 0, 0, 0)).attach(structure.root)
-        ends = _pillar(structure, pose, settings)
+        ends = _pillar(structure, pose, terrain)
         if ends is not None:
             scenery.add_pillar(root, _pillar_name(name), ends)
     for name, vehicle in vehicles.items():
@@ -213,15 +243,15 @@ def _place(pose: StructurePose) -> tuple[Array, Array]:
     return flip(pose.position) + 0.0, quaternion  # without the sign of a zero
 
 
-def _center(poses: Any, settings: WorldSettings) -> Array:
+def _center(poses: Any, terrain: Terrain) -> Array:
     """Middle (3,) of the structures in MuJoCo's world; of the water column where there are none."""
     places = [_place(pose)[0] for pose in poses]
-    return np.mean(places, axis=0) if places else np.array([0.0, 0.0, -0.5 * settings.sea_floor])
+    return np.mean(places, axis=0) if places else np.array([0.0, 0.0, -0.5 * terrain.depth(0.0, 0.0)])
 
 
-def _check_depth(name: str, structure: library.Structure, pose: StructurePose, settings: WorldSettings) -> None:
+def _check_depth(name: str, structure: library.Structure, pose: StructurePose, terrain: Terrain) -> None:
     """Sees that the mouth of a structure is in the water as a whole."""
-    radius, floor = structure.mouth_radius, settings.sea_floor
+    radius, floor = structure.mouth_radius, terrain.depth(pose.north, pose.east)
     if not radius <= pose.depth <= floor - radius:
         raise InputError(
             f"structure '{name}': a mouth of radius {radius:g} m at a depth of {pose.depth:g} m is not wholly between "
@@ -233,10 +263,14 @@ def _pillar_name(structure: str) -> str:
     return f"{structure}:pillar"
 
 
-def _pillar(structure: library.Structure, pose: StructurePose, settings: WorldSettings) -> Array | None:
+def _has_pillar(pose: StructurePose, terrain: Terrain) -> bool:
+    return scenery.pillar_ends(terrain.depth(pose.north, pose.east), pose.depth, np.zeros(2)) is not None
+
+
+def _pillar(structure: library.Structure, pose: StructurePose, terrain: Terrain) -> Array | None:
     """Ends (6,) of a structure's pillar, which stands 0.3 m behind the end of its cone."""
     ahead = (structure.cone_length + 0.3) * np.array([np.cos(pose.heading), -np.sin(pose.heading)])
-    return scenery.pillar_ends(settings.sea_floor, pose.depth, _place(pose)[0][:2] + ahead)
+    return scenery.pillar_ends(terrain.depth(pose.north, pose.east), pose.depth, _place(pose)[0][:2] + ahead)
 
 
 def compile_scene(root: Any) -> mujoco.MjModel:

@@ -8,9 +8,10 @@ import numpy as np
 
 from auvsim.base.errors import DivergenceError, InputError
 from auvsim.base.frames import Array, flip
-from auvsim.physics import hydrodynamics
+from auvsim.physics import hydrodynamics, panels
 from auvsim.physics.contacts import Contact, ContactRecorder
 from auvsim.physics.craft import Craft
+from auvsim.physics.scenery import SEA_FLOOR
 from auvsim.physics.scenes import Scene, pair_name
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
@@ -83,6 +84,9 @@ class World:
             name: Craft(model, self.data, name, vehicle, slots[f"{name}/"]) for name, vehicle in scene.vehicles.items()
         }
         self.vehicles = tuple(self._craft)
+        for name, structure in scene.structures.items():
+            if structure.panel_contact is not None and self.vehicles:
+                panels.soften(model, name, self.vehicles, *structure.panel_contact)
         self.models = scene.vehicles
         self._options, self._sensors = model.opt, self.data.sensordata
         active = self.data.eq_active
@@ -113,14 +117,22 @@ class World:
         """Time since the start [s]."""
         return self.data.time
 
-    @property
-    def floor(self) -> float:
-        """Depth of the sea floor at the datum [m]."""
-        return self.terrain.depth(0.0, 0.0)
-
     def contacts(self, vehicle: str) -> list[Contact]:
         """Contacts of a vehicle so far, in order of time."""
         return self._recorder.found[vehicle]
+
+    def surfaced(self, vehicle: str) -> bool:
+        """Whether any part of a vehicle's hull is out of the water."""
+        return self._craft[vehicle].surfaced
+
+    def grounded(self, vehicle: str, since: float) -> bool:
+        """Whether a vehicle has touched the sea floor after a time [s]."""
+        for contact in reversed(self._recorder.found[vehicle]):
+            if contact.time <= since:
+                return False
+            if contact.other == SEA_FLOOR:
+                return True
+        return False
 
     def latched(self, vehicle: str) -> str | None:
         """Name of the structure whose latch holds a vehicle."""

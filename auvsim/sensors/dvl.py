@@ -1,7 +1,8 @@
 """A Doppler velocity log: velocity over ground (bottom track) and through a layer of water below (water track).
 
 It is taken as measured at the body's origin: the lever arm of its mounting, yaw rate times about half a metre, is
-known on a real vehicle, which takes it out with its gyro. Altitude is the vertical distance to the flat sea floor.
+known on a real vehicle, which takes it out with its gyro. Altitude is the vertical distance to the sea floor
+below the body's origin.
 """
 
 import math
@@ -100,7 +101,8 @@ class Dvl(Sensor):
         water = world.current.evaluate(truth.time, truth.position + self._below).velocity
         through = ground - water @ rotation(*truth.attitude.tolist())
         value = np.concatenate((self._errors @ ground, self._errors @ through)) + noise
-        altitude = world.floor - float(truth.position[2])
+        north, east, down = truth.position.tolist()
+        altitude = world.terrain.depth(north, east) - down
         bottom = settings.minimum_altitude <= altitude <= settings.maximum_altitude
         layer = altitude >= settings.minimum_altitude and USABLE * altitude >= settings.water_layer[1]
         if not bottom or chances[0] < settings.dropout_probability:

@@ -14,6 +14,7 @@ from auvsim.data.variables import Variable
 from auvsim.physics.truth import Truth
 from auvsim.vehicles.library import Vehicle
 from auvsim.water.currents import CurrentField
+from auvsim.water.terrain import Terrain
 
 
 class Surroundings(Protocol):
@@ -25,8 +26,8 @@ class Surroundings(Protocol):
         ...
 
     @property
-    def floor(self) -> float:
-        """Depth of the sea floor [m]."""
+    def terrain(self) -> Terrain:
+        """The sea floor."""
         ...
 
     @property

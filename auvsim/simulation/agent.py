@@ -29,6 +29,7 @@ from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board
 from auvsim.simulation.setups import model_speed, navigator_setup, usbl_dock
+from auvsim.simulation.stretches import Stretches
 from auvsim.vehicles.library import Vehicle
 from estimators.core.types import Outcome
 
@@ -86,7 +87,6 @@ class Agent:
         heading = math.radians(start.heading_deg)
         self.dock = usbl_dock(plan, name)
         self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does
-        self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
         self.mission = mission or missions.build(
             settings.mission.kind,
             MissionSetup(
@@ -102,6 +102,7 @@ class Agent:
                 ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
             ),
         )
+        self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
         self.controller = controllers.build(
             settings.control.kind,
             ControllerSetup(
@@ -134,6 +135,7 @@ class Agent:
         self._messages_to_filter: list[Delivery] = []
         self._to_mission: list[Reading] = []  # since the last update of the mission
         self._end = math.inf
+        self._stretches = Stretches()
         self.over = False
         self._running = self._controller  # the part whose code runs now, to blame for what it raises
         self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
@@ -240,6 +242,7 @@ class Agent:
             parts.demand(self.commands, self._demands)
         log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
         log.append(self._commands, (time, *self.commands))
+        self._warn(time, log)
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
         mission.events.clear()
@@ -247,6 +250,12 @@ class Agent:
             self._end = time + mission.aftermath
         self.over = time >= self._end
         return self.commands
+
+    def _warn(self, time: float, log: Log) -> None:
+        """Logs the controller's warning where one begins; a controller of the user's own may have none."""
+        warning = getattr(self.controller, "warning", None)
+        if warning is not None and self._stretches.begins(time, "authority"):
+            log.event(time, self.name, "authority", str(warning))
 
     @property
     def approach(self) -> int | None:
@@ -256,8 +265,10 @@ class Agent:
 
     def overdue(self, duration: float) -> str:
         """What the log says when the time limit [s] of the run ends the mission."""
-        self._running = self._mission
-        return str(self.mission.overdue(duration))
+        try:
+            return str(self.mission.overdue(duration))
+        except Exception as error:
+            raise self._mission.blamed(error) from error.__cause__
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:

@@ -7,6 +7,8 @@ from typing import Any, NamedTuple
 
 from numpy.random import Generator
 
+LARGEST = 1e12  # size of a parameter
+
 
 class Distribution(NamedTuple):
     """How a distribution of given parameters is drawn; both raise ValueError for parameters that make no sense."""
@@ -23,6 +25,9 @@ def _numbers(parameters: Any, *names: str) -> list[float]:
     if not numbers or len(parameters) != len(names):
         count = {2: "two", 4: "four"}[len(names)]
         raise ValueError(f"needs {count} numbers, [{', '.join(names)}]")
+    for number in parameters:
+        if abs(number) > LARGEST:
+            raise ValueError(f"{number:g} is too large; numbers are at most {LARGEST:g} in size")
     return [float(number) for number in parameters]
 
 

@@ -15,7 +15,7 @@ from dm_env import specs
 
 from auvsim.base.errors import DivergenceError, InputError
 from auvsim.base.frames import rotation
-from auvsim.physics import scenes
+from auvsim.physics import scenery, scenes
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.world import World
 from auvsim.simulation.run import Simulation, current
@@ -23,7 +23,6 @@ from auvsim.simulation.scenario import Scenario
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
 from auvsim.vehicles.library import Vehicle
-from auvsim.water.terrain import FlatFloor
 
 
 class CommandedAgent:
@@ -67,6 +66,8 @@ class Docking(control.Task):
         self._plan, self._seed, self._episode = plan, seed, 0
         self._name, settings = plan.lone
         self._dock_name = plan.dock_of(self._name)
+        if not settings.ballast.is_zero:
+            raise InputError("vehicle.ballast: the environment has vehicles as their models have them; leave it out")
         if self._dock_name is None:
             raise InputError("the scenario has no dock; the environment is that of a docking")
         dock = plan.structures[self._dock_name]
@@ -85,12 +86,13 @@ class Docking(control.Task):
     def initialize_episode(self, physics: Any) -> None:
         """Places the vehicle at the scenario's start; the current is drawn anew each episode."""
         plan, dock = self._plan, str(self._dock_name)
+        scenery.shape_sea_floor(physics.model.ptr, plan.world.floor)
         scene = scenes.Scene(
             physics.model.ptr,
             {self._name: self._vehicle},
             {dock: self._dock},
             {dock: self._pose},
-            FlatFloor(plan.water.sea_floor),
+            plan.world.floor,
         )
         water = current(plan, self._seed, self._episode)
         world = World(scene, water, plan.water.density, data=physics.data.ptr)

@@ -11,6 +11,7 @@ from auvsim.base.frames import Array, euler_to_quaternion, rotation, wrap
 from auvsim.physics.truth import Truth
 from auvsim.vehicles.actuation import FinsAndShaft
 from auvsim.water.currents import CurrentField
+from auvsim.water.terrain import FlatFloor
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
 
@@ -42,7 +43,7 @@ class PlanarWorld:
         self._process = PlanarProcess(parameters, densities)
         self.vehicles, self.current = (name,), current
         self.structures: dict[str, Any] = {}
-        self.floor = math.inf
+        self.terrain = FlatFloor(math.inf)
         self._actuation = actuation
         self._rate, self._generator = rate, generator
         self._ticks = 0
@@ -83,6 +84,14 @@ class PlanarWorld:
     def contacts(self, vehicle: str) -> list[Any]:
         """None: there is nothing to touch."""
         return []
+
+    def surfaced(self, vehicle: str) -> bool:
+        """False: the vehicle stays at its depth."""
+        return False
+
+    def grounded(self, vehicle: str, since: float) -> bool:
+        """False: there is no floor."""
+        return False
 
     def latched(self, vehicle: str) -> str | None:
         """None: there is no latch."""

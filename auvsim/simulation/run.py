@@ -29,6 +29,7 @@ from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
 from auvsim.simulation.parts import PartError
 from auvsim.simulation.scenario import Scenario, to_yaml
+from auvsim.simulation.stretches import Stretches
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField, build_current, listeners
 
@@ -78,9 +79,7 @@ def run(
                     progress(simulation.progress())
             for agent in simulation.agents:
                 if not agent.over:
-                    log.event(
-                        simulation.time, agent.name, "timeout", with_blame(agent, agent.overdue, scenario.duration)
-                    )
+                    log.event(simulation.time, agent.name, "timeout", agent.overdue(scenario.duration))
         except DivergenceError as error:
             status = "diverged"
             log.event(simulation.time, "", "diverged", str(error))
@@ -150,6 +149,7 @@ class Simulation:
         self._log_ticks = max(1, round(rates.control / rates.log))
         self.progress_ticks = round(6.0 * rates.control)
         self._listeners = listeners(self.world.current)
+        self._stretches = Stretches()
         self.ticks = 0
         self.truths: dict[str, Truth] = {}
         for name, settings in scenario.vehicles.items():
@@ -195,8 +195,13 @@ class Simulation:
         self.ticks += 1
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
-        for agent in self.agents:
-            with_blame(agent, agent.sense, self.ticks, self.truths[agent.name], world, log)
+        self._report_limits(time)
+        agent: Any = None
+        try:
+            for agent in self.agents:
+                agent.sense(self.ticks, self.truths[agent.name], world, log)
+        except (Exception, SystemExit) as error:
+            raise agent.blame(error) from error.__cause__
         for ping, fate in self.network.poll(before, self.truths):
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
@@ -205,16 +210,32 @@ class Simulation:
             log.append(
                 "network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
             )
-        for agent in self.agents:
-            agent.receive(self.network.deliver(agent.name, time))
-            with_blame(agent, agent.navigate, self.ticks, time, log)
-        for agent in self.agents:
-            demand = with_blame(agent, agent.act, time, world.latched(agent.name), log)
-            if demand is not None:
-                self._report_approach(agent)
-                world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+        try:
+            for agent in self.agents:
+                agent.receive(self.network.deliver(agent.name, time))
+                agent.navigate(self.ticks, time, log)
+                demand = agent.act(time, world.latched(agent.name), log)
+                if demand is not None:
+                    if self._listeners:
+                        self._report_approach(agent)
+                    world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+        except (Exception, SystemExit) as error:
+            raise agent.blame(error) from error.__cause__
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
+
+    def _report_limits(self, time: float) -> None:
+        """Logs vehicles that come out of the water or touch the sea floor."""
+        world, before = self.world, time - 1.0 / self.scenario.rates.control
+        for agent in self.agents:
+            name = agent.name
+            for kind, holds, what in (
+                ("surfaced", world.surfaced(name), "part of the hull is out of the water"),
+                ("grounded", world.grounded(name, before), "touches the sea floor"),
+            ):
+                if holds and self._stretches.begins(time, name, kind):
+                    depth = float(self.truths[name].position[2])
+                    self.log.event(time, name, kind, f"{what}, depth {depth:.2f} m")
 
     def progress(self) -> ProgressState:
         """Progress of the run."""
@@ -248,7 +269,7 @@ class Simulation:
 
     def _report_approach(self, agent: Agent) -> None:
         """Reports the first vehicle's distance from its dock to currents that turn in approaches."""
-        if not self._listeners or agent.mission is None:
+        if agent.mission is None:
             return
         attempt, dock = agent.approach, agent.mission.dock
         if attempt is not None and dock is not None and agent is self.agents[0]:
@@ -329,18 +350,6 @@ class Unrecorded:
         """Keeps nothing."""
 
 
-def with_blame(agent: Agent, turn: Callable[..., Any], *arguments: Any) -> Any:
-    """One turn of an agent; what a part of a user's own raises in it names that part.
-
-    Raises:
-        PartError: a part of a user's own raised something.
-    """
-    try:
-        return turn(*arguments)
-    except (Exception, SystemExit) as error:
-        raise agent.blame(error) from error.__cause__
-
-
 def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
     """The current of a run; its draws are from a stream of the only vehicle, or of the water."""
     names = [*scenario.vehicles]
@@ -371,6 +380,7 @@ def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> Worl
         {name: (settings.model, settings.pose) for name, settings in scenario.structures.items()},
         scenario.world,
         scenario.rates.physics,
+        {name: settings.ballast for name, settings in scenario.vehicles.items()},
     )
     return World(scene, current, scenario.water.density, **given)
 

@@ -16,11 +16,13 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
+from auvsim.water.terrain import FlatSettings, TerrainSettings
 
 Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
 
@@ -41,16 +43,16 @@ class DatumSettings(Settings):
 class Rates(Settings):
     """Rates of the parts of the loop; control divides the physics rate, the others divide control."""
 
-    physics: float = Field(default=100.0, gt=0.0, description="steps of the dynamics [Hz]")
-    control: float = Field(default=10.0, gt=0.0, description="guidance and control [Hz]")
-    filter: float = Field(default=2.0, gt=0.0, description="predictions of the estimator [Hz]")
-    log: float = Field(default=10.0, gt=0.0, description="logged states of the truth [Hz]")
+    physics: float = Field(default=100.0, ge=0.1, le=10_000.0, description="steps of the dynamics [Hz]")
+    control: float = Field(default=10.0, ge=0.01, le=1_000.0, description="guidance and control [Hz]")
+    filter: float = Field(default=2.0, ge=0.001, le=1_000.0, description="predictions of the estimator [Hz]")
+    log: float = Field(default=10.0, ge=0.001, le=1_000.0, description="logged states of the truth [Hz]")
 
 
 class Start(Settings):
     """Where and how the vehicle starts: at a place, or at a range and bearing from a structure."""
 
-    range: float = Field(default=300.0, gt=0.0, description="horizontal distance from the dock's mouth [m]")
+    range: float = Field(default=300.0, gt=0.0, le=1e5, description="horizontal distance from the dock's mouth [m]")
     bearing_deg: float = Field(
         default=0.0,
         description="bearing from the dock, clockwise from the axis extended out of the mouth [deg]",
@@ -61,8 +63,8 @@ class Start(Settings):
         default=None, description="structure that range and bearing are from; none: the mission's dock, or the only one"
     )
     heading_deg: float = Field(default=0.0, description="heading, clockwise from north [deg]")
-    depth: float = Field(default=20.0, ge=0.0, description="depth [m]")
-    speed: float = Field(default=1.0, ge=0.0, description="speed through the water, straight ahead [m/s]")
+    depth: float = Field(default=20.0, ge=0.0, le=12_000.0, description="depth [m]")
+    speed: float = Field(default=1.0, ge=0.0, le=20.0, description="speed through the water, straight ahead [m/s]")
 
     @model_validator(mode="after")
     def _whole_place(self) -> "Start":
@@ -76,6 +78,7 @@ class VehicleSettings(Settings):
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    ballast: BallastSettings = BallastSettings()
     sensors: SensorSettings = SensorSettings()
     estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
@@ -88,7 +91,7 @@ class StructureSettings(Settings):
     model: str = Field(default="dock", description="a folder in models/, or the path of an .xml file")
     north: float = Field(default=0.0, description="north of the datum, centre of the mouth [m]")
     east: float = Field(default=0.0, description="east of the datum, centre of the mouth [m]")
-    depth: float = Field(default=20.0, gt=0.0, description="depth of the centre of the mouth [m]")
+    depth: float = Field(default=20.0, gt=0.0, le=12_000.0, description="depth of the centre of the mouth [m]")
     heading_deg: float = Field(
         default=0.0, description="course of a vehicle that enters along the axis, clockwise from north [deg]"
     )
@@ -102,8 +105,11 @@ class StructureSettings(Settings):
 class WaterSettings(Settings):
     """The water and its floor."""
 
-    density: float = Field(default=WorldSettings().water_density, gt=0, description="density of the water [kg/m3]")
-    sea_floor: float = Field(default=40.0, gt=0, description="depth of the sea floor [m]")
+    density: float = Field(
+        default=WorldSettings().water_density, ge=900.0, le=1300.0, description="density of the water [kg/m3]"
+    )
+    sea_floor: float = Field(default=40.0, gt=0, le=12_000.0, description="depth of the sea floor [m]")
+    terrain: TerrainSettings = Field(default=FlatSettings(), description="Shape of the sea floor, by its `kind`.")
     current: CurrentSettings = Field(
         default=UniformSettings(speed=0.0), description="The water's velocity, by its `kind`."
     )
@@ -126,7 +132,7 @@ class NetworkSettings(Settings):
 class Scenario(Settings):
     """One run, with every number definite."""
 
-    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the run [s]")
+    duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
     datum: DatumSettings = DatumSettings()
     physics: PhysicsSettings = PhysicsSettings()
@@ -161,10 +167,13 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _all_in_the_water(self) -> "Scenario":
-        floor = self.water.sea_floor
-        depths = [(f"structures.{name}.depth", structure.depth) for name, structure in self.structures.items()]
-        depths += [(f"vehicles.{name}.start.depth", vehicle.start.depth) for name, vehicle in self.vehicles.items()]
-        for key, depth in depths:
+        if self.water.terrain.kind == "grid":
+            return self  # the world sees to it, which reads the file
+        terrain = self.world.floor
+        places = [(f"structures.{name}.depth", s.pose.position.tolist()) for name, s in self.structures.items()]
+        places += [(f"vehicles.{name}.start.depth", self.start_position(name)) for name in self.vehicles]
+        for key, (north, east, depth) in places:
+            floor = terrain.depth(north, east)
             if not 0.0 < depth < floor:
                 raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
         return self
@@ -187,6 +196,7 @@ class Scenario(Settings):
             integrator=self.physics.integrator,
             water_density=self.water.density,
             sea_floor=self.water.sea_floor,
+            terrain=self.water.terrain,
         )
 
     def dock_of(self, vehicle: str, structure: str | None = None) -> str | None:

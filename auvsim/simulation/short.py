@@ -19,6 +19,7 @@ from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import WorldSettings
 from auvsim.simulation.scenario import DatumSettings, Rates, Scenario, Start, StructureSettings, validated
 from auvsim.simulation.sensor_settings import SensorSettings
@@ -27,16 +28,17 @@ from auvsim.water.settings import CurrentSettings, UniformSettings
 
 
 class LoneVehicle(Settings):
-    """The vehicle and its start."""
+    """The vehicle, its start and its ballast."""
 
     model: str = Field(default="remus100", description="a folder in models/, or the path of an .xml file")
     start: Start = Start()
+    ballast: BallastSettings = BallastSettings()
 
 
 class ShortScenario(Settings):
     """One run of one vehicle, with every number definite."""
 
-    duration: float = Field(default=1200.0, gt=0.0, description="time limit of the run [s]")
+    duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
     datum: DatumSettings = DatumSettings()
     vehicle: LoneVehicle = LoneVehicle()
@@ -67,7 +69,7 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
     places = places or {}
     values = renewed(values)
     short: ShortScenario = validated(ShortScenario, values, places)
-    whole = _full(short)
+    whole = _full(short, places)
     try:
         return Scenario.model_validate(whole)
     except ValidationError as error:
@@ -111,26 +113,31 @@ def _of_a_kind(estimator: Mapping) -> dict:
     return {"kind": kind} | heeded | {key: value for key, value in rest.items() if key in known or key not in of_all}
 
 
-def _full(short: ShortScenario) -> dict[str, Any]:
+def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
     """The full form of a short scenario."""
     mission: Any = short.mission or short.guidance
     if short.mission is None and short.manoeuvre is not None:
         mission = {"kind": "manoeuvre", "manoeuvre": short.manoeuvre.model_dump()}
-    name = library.model_name("vehicle", short.vehicle.model)
+    name = _model_name("vehicle", short.vehicle.model, "vehicle.model", places)
+    dock = _model_name("structure", short.dock.model, "dock.model", places) if short.dock else ""
     return {
         "duration": short.duration,
         "rates": short.rates,
         "datum": short.datum,
         "physics": {"integrator": short.world.integrator},
         "water": {
-            "density": short.world.water_density, "sea_floor": short.world.sea_floor, "current": short.current
+            "density": short.world.water_density,
+            "sea_floor": short.world.sea_floor,
+            "terrain": short.world.terrain,
+            "current": short.current,
         },
         "network": {"acoustics": short.acoustics},
-        "structures": {library.model_name("structure", short.dock.model): short.dock} if short.dock else {},
+        "structures": {dock: short.dock} if short.dock else {},
         "vehicles": {
             name: {
                 "model": short.vehicle.model,
                 "start": short.vehicle.start,
+                "ballast": short.vehicle.ballast,
                 "sensors": short.sensors,
                 "estimator": short.estimator,
                 "control": short.control,
@@ -140,9 +147,17 @@ def _full(short: ShortScenario) -> dict[str, Any]:
     }  # fmt: skip
 
 
+def _model_name(kind: str, model: str, key: str, places: Mapping[str, str]) -> str:
+    """Name of a model, with errors that say where it was given."""
+    try:
+        return library.model_name(kind, model)
+    except InputError as error:
+        raise InputError(": ".join(part for part in (schema.place(key, places), key, str(error)) if part)) from None
+
+
 def _short_key(path: str, short: ShortScenario) -> str:
     """The short form of a dotted key of the full form."""
-    path = re.sub(r"^vehicles\.[\w-]+\.(model|start)\b", r"vehicle.\1", path)
+    path = re.sub(r"^vehicles\.[\w-]+\.(model|start|ballast)\b", r"vehicle.\1", path)
     path = re.sub(r"^vehicles\.[\w-]+\.", "", path)
     path = re.sub(r"^structures\.[\w-]+\.", "dock.", path)
     if short.mission is None and path.startswith("mission."):

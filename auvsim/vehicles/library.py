@@ -1,5 +1,6 @@
 """Finds models/ (in a checkout or in the installed package) and loads vehicles and structures as PyMJCF elements."""
 
+import math
 import re
 from dataclasses import dataclass
 from functools import lru_cache
@@ -39,14 +40,18 @@ class Structure:
     cone_length: float  # mouth to throat along the axis [m]
     throat_length: float  # end of the cone to the stop along the axis [m]
     latched: float  # where the latch holds the nose, along the axis from the mouth [m]
+    aligned_within: float | None = None  # largest angle between vehicle and axis that counts as aligned [rad]
+    panel_contact: tuple[float, float] | None = None  # stiffness [N/m] and damping [N s/m] of its panels
 
     @property
     def dimensions(self) -> dict[str, float]:
-        """Its dimensions by name [m]."""
+        """Its dimensions by name [m], and the angle within which it says that a vehicle is aligned [rad]."""
         names = ("mouth_radius", "throat_radius", "cone_length", "throat_length", "latched")
-        return {name: getattr(self, name) for name in names}
+        found = {name: getattr(self, name) for name in names}
+        return found | ({} if self.aligned_within is None else {"aligned_within": self.aligned_within})
 
 
+ALIGNED = math.radians(5.0)  # of docks that do not say within which angle a vehicle is aligned [rad]
 PACKAGE = Path(auvsim.__file__).parent
 _MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
 INSTANCE = re.compile(r"[A-Za-z_][\w-]{0,63}", re.ASCII)  # what a vehicle or structure may be called
@@ -89,7 +94,7 @@ def find(kind: str, name: str) -> Path:
         return Path(name).expanduser()
     folder = models_folder()
     path = folder / name / f"{name}.xml"
-    if not path.is_file():
+    if not INSTANCE.fullmatch(name) or not path.is_file():
         known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
         raise unknown_name(kind, name, known)
     return path
@@ -159,6 +164,19 @@ def _length(root: Any, where: str, name: str) -> float:
     if data.size != 1 or data[0] <= 0.0:
         raise InputError(f"model {where}: '{name}' is {data.tolist()}; it must be one number above 0 [m]")
     return float(data[0])
+
+
+def _panel_contact(root: Any, where: str) -> tuple[float, float] | None:
+    """Stiffness [N/m] and damping [N s/m] of a dock's panels, if it says so."""
+    if root.find("numeric", "panel_contact") is None:
+        return None
+    data = _numeric(root, where, "panel_contact")
+    if data.size != 2 or data[0] <= 0.0 or data[1] < 0.0:
+        raise InputError(
+            f"model {where}: 'panel_contact' is {data.tolist()}; it must be a stiffness above 0 [N/m] and a damping of "
+            "0 or more [N s/m]"
+        )
+    return float(data[0]), float(data[1])
 
 
 def _site(root: Any, where: str, name: str) -> Array:
@@ -253,4 +271,13 @@ def structure(name: str) -> Structure:
             f"model {name}: the site 'latched' is {latched:g} m behind the mouth; it must be between 0 and the stop at "
             f"{cone + rest:g} m"
         )
-    return Structure(model=root.model, root=root, source=text, latched=latched, **lengths)
+    aligned = root.find("numeric", "aligned_within")
+    return Structure(
+        model=root.model,
+        root=root,
+        source=text,
+        latched=latched,
+        aligned_within=None if aligned is None else _length(root, name, "aligned_within"),
+        panel_contact=_panel_contact(root, name),
+        **lengths,
+    )

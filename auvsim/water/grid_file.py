@@ -15,7 +15,7 @@ from auvsim.water.settings import GridSettings
 
 _SPEEDS = {"m/s": 1.0, "m s-1": 1.0, "m.s-1": 1.0, "m s^-1": 1.0, "m s**-1": 1.0, "meter second-1": 1.0}
 _SPEEDS |= {"meters/second": 1.0, "meters per second": 1.0, "cm/s": 0.01, "cm s-1": 0.01}
-_LENGTHS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "km": 1000.0}
+LENGTHS = {"m": 1.0, "meter": 1.0, "meters": 1.0, "metre": 1.0, "metres": 1.0, "km": 1000.0}
 _TIMES = {"s": 1.0, "sec": 1.0, "second": 1.0, "min": 60.0, "minute": 60.0, "h": 3600.0, "hour": 3600.0, "day": 86400.0}
 _NAMES = {
     "northward": ("northward_sea_water_velocity", "sea_water_y_velocity"),
@@ -51,14 +51,19 @@ def read(settings: GridSettings) -> GriddedCurrents:
     Raises:
         InputError: the file cannot be read, lacks a variable or coordinate, has other units or gaps.
     """
-    variables = _variables(Path(settings.file))
+    variables = read_variables(Path(settings.file))
     try:
         return _gridded(variables, settings)
     except InputError as error:
         raise InputError(f"{settings.file}: {error}") from None
 
 
-def _variables(path: Path) -> dict[str, Variable]:
+def read_variables(path: Path) -> dict[str, Variable]:
+    """The numeric variables of a NetCDF file, by name.
+
+    Raises:
+        InputError: there is no such file, or it is no NetCDF.
+    """
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     try:
@@ -115,7 +120,7 @@ def _gridded(variables: dict[str, Variable], settings: GridSettings) -> GriddedC
     for dimension in north.dimensions:
         if dimension not in variables:
             raise InputError(f"dimension '{dimension}' has no coordinate variable of its name")
-        which, values = _coordinate(dimension, variables[dimension], settings)
+        which, values = coordinate(dimension, variables[dimension], settings)
         if which in coordinates:
             raise InputError(f"two coordinates are {which}: {coordinates[which][0]} and {dimension}")
         coordinates[which] = dimension, values
@@ -157,10 +162,15 @@ def _velocity(variables: dict[str, Variable], settings: GridSettings, which: str
     elif name not in variables:
         raise InputError(f"no variable '{name}'; there are {', '.join(variables)}")
     found = variables[name]
-    return found._replace(values=found.values * _factor(name, found.units, _SPEEDS))
+    return found._replace(values=found.values * factor(name, found.units, _SPEEDS))
 
 
-def _factor(name: str, units: str, known: dict[str, float]) -> float:
+def factor(name: str, units: str, known: dict[str, float]) -> float:
+    """What a variable's values are multiplied by to be in SI units.
+
+    Raises:
+        InputError: its units are not among those known.
+    """
     if units not in known:
         raise InputError(f"'{name}' has the units '{units}'; known are {', '.join(known)}")
     return known[units]
@@ -169,15 +179,24 @@ def _factor(name: str, units: str, known: dict[str, float]) -> float:
 _GEOGRAPHIC = {"north": "latitude", "east": "longitude"}
 
 
-def _coordinate(name: str, variable: Variable, settings: GridSettings) -> tuple[str, Array]:
-    """Which axis a coordinate is, and its values [s or m]."""
+def coordinate(name: str, variable: Variable, settings: Any) -> tuple[str, Array]:
+    """Which axis a coordinate is, and its values [s or m].
+
+    Args:
+        name: of the variable.
+        variable: the coordinate.
+        settings: with the latitude and longitude of the datum [deg], or None.
+
+    Raises:
+        InputError: it has gaps, unknown units, or is no coordinate that is known.
+    """
     if not np.all(np.isfinite(variable.values)):
         raise InputError(f"coordinate '{name}' has gaps")
     standard, axis = str(variable.attributes.get("standard_name", "")), str(variable.attributes.get("axis", ""))
     units, lower = variable.units, name.lower()
     since = re.match(r"(\w+?)s? since ", units)
     if since or standard == "time" or axis == "T" or lower == "time":
-        return "time", variable.values * _factor(name, since[1] if since else units, _TIMES)
+        return "time", variable.values * factor(name, since[1] if since else units, _TIMES)
     if units.lower().startswith("degree") and units.lower() not in ("degree", "degrees"):
         which = "north" if "n" in units.lower()[6:] else "east"
         return which, _metres(variable.values, which, settings)
@@ -191,11 +210,11 @@ def _coordinate(name: str, variable: Variable, settings: GridSettings) -> tuple[
                 return which, _metres(variable.values, which, settings)
             upward = variable.attributes.get("positive", "up" if standard in ("height", "altitude") else "down") == "up"
             sign = -1.0 if which == "depth" and upward else 1.0
-            return which, sign * variable.values * _factor(name, units, _LENGTHS)
+            return which, sign * variable.values * factor(name, units, LENGTHS)
     raise InputError(f"coordinate '{name}' is no time, depth, latitude, longitude, y or x: give it a standard_name")
 
 
-def _metres(degrees: Array, which: str, settings: GridSettings) -> Array:
+def _metres(degrees: Array, which: str, settings: Any) -> Array:
     """North or east [m] of the datum, by the radii of curvature of WGS84 there."""
     latitude, longitude = settings.latitude, settings.longitude
     if latitude is None or longitude is None:

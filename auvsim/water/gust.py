@@ -16,6 +16,8 @@ GUST_CORRELATION = 2.146193220620583
 # Knot spacing in units of 1 / beta. The variance that the cubic between knots lacks, 4 x^3 / 192, is then 2e-5.
 _GUST_STEP = 0.1
 
+MOST = 1e5  # correlation times in a gust: its knots then take 0.3 GB
+
 
 class Gust:
     """One realisation of the second-order Gauss-Markov process, drawn for a whole trial.
@@ -30,6 +32,11 @@ class Gust:
     def __init__(self, settings: GustSettings, generator: Generator, duration: float) -> None:
         beta = GUST_CORRELATION / settings.correlation_time
         self._step = _GUST_STEP / beta
+        if duration / settings.correlation_time > MOST:
+            raise InputError(
+                f"current: a gust of correlation_time {settings.correlation_time:g} s is too long to be drawn for "
+                f"{duration:g} s; give at least {duration / MOST:.3g} s, or a shorter duration"
+            )
         count = math.floor(duration / self._step) + 3  # covers a step more than the duration: rounding of the time
         self._end = (count - 1) * self._step
         draws = generator.standard_normal((count, 2, 2))  # knot, axis, state

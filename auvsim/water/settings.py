@@ -93,7 +93,7 @@ class GustSettings(Settings):
 
     kind: Literal["gust"] = "gust"
     intensity: float = Field(default=0.05, ge=0.0, description="standard deviation of each component [m/s]")
-    correlation_time: float = Field(default=30.0, gt=0.0, description="time in which correlation falls to 1/e [s]")
+    correlation_time: float = Field(default=30.0, ge=0.1, description="time in which correlation falls to 1/e [s]")
 
 
 class BoundaryLayerSettings(Settings):

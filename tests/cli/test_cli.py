@@ -335,8 +335,6 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
         ({}, {"libEGL.so.1", "libGL.so.1"}, "egl"),
         ({}, {"libEGL.so.1"}, "disable"),
         ({}, set(), "disable"),
-        ({"DISPLAY": ":0"}, {"libEGL.so.1", "libGL.so.1"}, None),
-        ({"MUJOCO_GL": "osmesa"}, {"libEGL.so.1", "libGL.so.1"}, "osmesa"),
     ],
 )
 def test_renderer(environment: dict[str, str], libraries: set[str], chosen: str | None) -> None:

@@ -81,9 +81,9 @@ def test_divergence_is_diagnosed(
 @pytest.mark.parametrize(
     ("arguments", "text"),
     [
-        (["--vehicle.model", "remus"], "no vehicle 'remus'; there are "),
+        (["--vehicle.model", "remus"], "command line: vehicle.model: no vehicle 'remus'; there are "),
         (["--vehicle.model", "broken.xml"], "model broken.xml: "),
-        (["--vehicle.model", "none.xml"], "model none.xml: "),
+        (["--vehicle.model", "none.xml"], "command line: vehicle.model: model none.xml: "),
         (["--dock.model", "remus100"], "model remus100 lacks "),
         (["--estimator", "kalman"], "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm"),
         (["--estimator", "nowhere:factory"], "estimator 'nowhere:factory': ModuleNotFoundError"),

@@ -75,7 +75,7 @@ def test_what_is_wrong_is_said_and_nothing_written(
     """By the command: exit code 2, one line with what is wrong, no folder."""
     spoil, said = WRONG[case]
     path = write(tmp_path / "log.csv", spoil(columns(synthetic(2))))
-    assert cli.main(["identify", str(path), "--out", str(tmp_path / "out")]) == 2
+    assert cli.main(["identify", str(path), "--vehicle", "remus100", "--out", str(tmp_path / "out")]) == 2
     text = capsys.readouterr().err
     assert said in text
     assert text.count("\n") == 1

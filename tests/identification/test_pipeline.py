@@ -15,6 +15,7 @@ from auvsim.identification import judgement, pictures, pipeline, product, report
 from auvsim.identification.fit import DEFAULT_FREE, with_values
 from auvsim.identification.pipeline import Identification, identify
 from auvsim.identification.records import Readings, Record
+from auvsim.identification.segments import SegmentOptions
 from auvsim.identification.simulated import Kind, Vessel, simulate
 from auvsim.physics import planar_sets
 from auvsim.physics.planar_sets import Source
@@ -196,6 +197,9 @@ def test_the_command_leaves_what_a_trial_believes(
         write(tmp_path / f"{kind}.csv", table)
     arguments = ["identify", str(tmp_path / "multisine.csv"), "--holdout", str(tmp_path / "zigzag.csv")]
     arguments += ["--out", str(tmp_path / "out"), "--name", "lake", "--steps", "segments"]
+    assert cli.main(arguments) == 2
+    assert "give --vehicle too" in capsys.readouterr().err
+    arguments += ["--vehicle", "remus100"]
     assert cli.main(arguments) == 0
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
         "parameters.yaml",
@@ -210,13 +214,62 @@ def test_the_command_leaves_what_a_trial_believes(
     assert "planar model of remus100" in output.out
     assert "parameters.yaml" in output.err
     for flags, said in (
-        (["--name", "a/b"], "plain name"),
-        (["--steps", "guess"], "no step 'guess'"),
+        (["--vehicle", "remus100", "--name", "a/b"], "plain name"),
+        (["--vehicle", "remus100", "--steps", "guess"], "no step 'guess'"),
         (["--vehicle", "remus"], "no vehicle 'remus'"),
     ):
         assert cli.main([*arguments[:2], "--out", str(tmp_path / "none"), *flags]) == 2
         assert said in capsys.readouterr().err
         assert not (tmp_path / "none").exists()
+
+
+def test_deviations_bear_what_a_fit_leaves() -> None:
+    """Sensors that are believed ten times too good are weighed by residuals: the true deviations come back within 30 %.
+
+    A channel has some hundred samples or more, of which the fit's own unknowns take a few; positions have fifty.
+    """
+    true = record("multisine", 6, 200.0)
+    boastful = replace(true, deviations=true.deviations / 10.0)
+    found, weighed = pipeline._reweighted([boastful], TRUE, DEFAULT_FREE)
+    seen = np.isfinite(found.residual_rms)
+    np.testing.assert_allclose(weighed[0].deviations[seen], true.deviations[seen], rtol=0.3)
+    assert np.nanmax(found.residual_rms) < pipeline.LACKING
+    _, same = pipeline._reweighted([true], TRUE, DEFAULT_FREE)
+    np.testing.assert_array_equal(same[0].deviations, true.deviations)
+
+
+def test_the_step_that_predicts_best_is_kept() -> None:
+    """A last step that was led astray is not the result; one that is as good as another is."""
+    runs = [record("multisine", 7, 100.0)]
+    good = pipeline.fit_segments(runs, TRUE, DEFAULT_FREE, SegmentOptions(length=20.0))
+    astray = replace(good, method="prediction error", parameters=wrong(0.5))
+    kept, said = pipeline._kept(runs, TRUE, [good, astray])
+    assert kept == 0
+    assert "kept: segments" in said[0].text
+    assert pipeline._kept(runs, TRUE, [good, replace(good, method="prediction error")]) == (-1, [])
+
+
+def test_the_kept_fit_is_the_result(found: Identification) -> None:
+    """The last fit unless another one is named."""
+    last = replace(found.fit, method="last")
+    both = replace(found, fits=(found.fit, last))
+    assert both.fit is last
+    assert replace(both, kept=0).fit is found.fit
+
+
+def test_an_unmeasured_speed_is_that_of_the_shaft() -> None:
+    """A log without speeds: the vehicle's steady speed at its mean shaft speed, within a tenth; at most its fastest."""
+    true = record("zigzag", 3, 60.0)
+    blind = true.measured.copy()
+    blind[:, [3, 4, 6, 7]] = np.nan
+    silent = replace(true, measured=blind)
+    assert pipeline._speed([silent], "remus100") == pytest.approx(pipeline._speed([true], "remus100"), rel=0.1)
+    limit = library.vehicle("remus100").actuation.shaft_limit
+    at, beyond = (
+        replace(silent, inputs=np.column_stack([true.inputs[:, 0], np.full(len(true.times), shaft)]))
+        for shaft in (limit, 2.0 * limit)
+    )
+    assert pipeline._speed([beyond], "remus100") == pipeline._speed([at], "remus100")
 
 
 @pytest.mark.slow

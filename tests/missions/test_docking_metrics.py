@@ -287,3 +287,22 @@ def test_summaries_are_strict_json():
     assert values["real_time_factor"] is None  # no wall time was given
     assert values["estimate"]["all"]["position_rms"] is None
     json.dumps(values, allow_nan=False)
+
+
+@pytest.mark.parametrize(("off", "pitch", "aligned"), [(0.05, 0.02, True), (0.08, 0.05, False), (0.1, 0.0, False)])
+def test_pose_in_the_dock_at_the_end(off: float, pitch: float, aligned: bool):
+    """The nose and the angle to the axis of the last sample; 5 degrees are aligned where the dock does not say."""
+    recorder = straight_pass(cross=0.03, down=-0.02, off=off, pitch=pitch)
+    recorder.phase(5.8, "docked", 1)
+    summary = summarise(recorder.finish("complete"))
+    found = [summary[f"final_{name}"] for name in ("along", "cross", "down")]
+    assert found == pytest.approx([SPEED * (5.9 - 4.03), 0.03, -0.02], abs=1e-9)
+    apart = rotation(0.0, pitch, DOCK_HEADING + off)[:, 0] @ rotation(0.0, 0.0, DOCK_HEADING)[:, 0]
+    assert summary["final_angle_deg"] == pytest.approx(math.degrees(math.acos(apart)), abs=1e-6)
+    assert (summary["docked"], summary["docked_aligned"]) == (True, aligned)
+
+
+def test_no_pose_where_it_did_not_dock():
+    summary = summarise(straight_pass().finish("complete"))
+    assert summary["docked_aligned"] is False
+    assert summary["final_along"] is None

@@ -302,7 +302,7 @@ def test_a_vehicle_without_a_place_is_named():
 
 def test_a_world_without_structures_has_a_floor_all_the_same():
     world = build(["auv_1"], sea_floor=25.0)
-    assert world.floor == 25.0
+    assert world.terrain.depth(3.0, -4.0) == 25.0
     world.place("auv_1", np.array([900.0, 50.0, 23.6]), -1.0, 1.5, [0.0, 0.0, 0.2, 0.2, 93.0])
     world.advance(800)
     assert {contact.other for contact in world.contacts("auv_1")} == {"sea_floor"}

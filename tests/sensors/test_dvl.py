@@ -17,6 +17,7 @@ from auvsim.physics.truth import Truth
 from auvsim.sensors.dvl import Dvl, DvlSettings
 from auvsim.water.currents import CurrentField, build_current
 from auvsim.water.settings import ShearPoint, ShearSettings, UniformSettings
+from auvsim.water.terrain import FlatFloor
 
 EXACT: dict[str, Any] = {
     "bottom_noise": (0.0, 0.0, 0.0),
@@ -64,7 +65,9 @@ class Pinging(Dvl):
 
 def log(trial: int = 0, *, floor: float = 40.0, current: CurrentField | None = None, **settings: Any) -> Pinging:
     """A Doppler log of a trial, over its floor in its water."""
-    return Pinging(DvlSettings(**settings), stream(5, trial, "remus100/dvl"), Around(current or field(), floor))
+    return Pinging(
+        DvlSettings(**settings), stream(5, trial, "remus100/dvl"), Around(current or field(), FlatFloor(floor))
+    )
 
 
 def through_water(current: np.ndarray) -> np.ndarray:

@@ -41,7 +41,7 @@ def message(values: dict, **places: str) -> str:
         ("rates.filter", 0.3, "0.3 Hz does not divide the control rate 10 Hz; use 0.25 or 0.5 Hz"),
         ("rates.log", 30, "30 Hz does not divide the control rate 10 Hz; use 10 Hz"),
         ("rates.control", 30, "30 Hz does not divide the physics rate 100 Hz; use 25 or 50 Hz"),
-        ("rates.physics", 0, "0 should be greater than 0 (steps of the dynamics [Hz])"),
+        ("rates.physics", 0, "0 should be greater than or equal to 0.1 (steps of the dynamics [Hz])"),
         ("rates.physics", math.nan, ".nan should be a finite number"),
         ("duration", math.inf, ".inf should be a finite number (time limit of the run [s])"),
         ("duration", "600", "'600' should be a valid number"),
@@ -87,7 +87,7 @@ def test_place_is_that_of_the_nearest_key_above() -> None:
 
 def test_every_misspelled_key_is_recognised() -> None:
     """Any key with its last letter doubled is refused, and the right one is suggested."""
-    of_kinds = ("current.", "manoeuvre.", "mission.", "estimator.", "control.", "guidance.kind")
+    of_kinds = ("current.", "world.terrain.", "manoeuvre.", "mission.", "estimator.", "control.", "guidance.kind")
     for key in schema.keys(ShortScenario):
         if key.startswith(of_kinds):
             continue  # which keys there are depends on the kind

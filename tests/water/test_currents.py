@@ -211,7 +211,7 @@ def test_sum_adds_and_a_term_does_not_change_the_noise_of_another():
         ({"kind": "shear", "points": POINTS[:1]}, "at least 2"),
         ({"kind": "shear", "points": [POINTS[1], POINTS[0]]}, "must increase"),
         ({"kind": "shear", "profile": "linear", "points": POINTS}, "exactly 2"),
-        ({**GUST, "correlation_time": 0.0}, "greater than 0"),
+        ({**GUST, "correlation_time": 0.0}, "greater than or equal to 0.1"),
         ({"kind": "sum", "terms": []}, "at least 1"),
         ({"kind": "sum", "terms": [{"kind": "gust", "sigma": 1.0}]}, "sigma"),
     ],

@@ -67,7 +67,7 @@ class DockingSettings(Settings):
         description="largest angle between heading and dock axis before the line is turned instead [deg]",
     )
     final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
-    attempts: int = Field(default=3, ge=1, description="attempts before the vehicle gives up")
+    attempts: int = Field(default=3, ge=1, le=1000, description="attempts before the vehicle gives up")
     fix_timeout: float = Field(default=30.0, gt=0, description="time without a fix that breaks an approach off [s]")
     uncertain_timeout: float = Field(
         default=10.0,
@@ -120,7 +120,14 @@ class Docking(Mission):
         "vertical": Metric("float", "m", "its part downward"),
         "heading_error_deg": Metric("float", "deg", "heading less that of the dock, there"),
         "contact_impulse": Metric("float", "N s", "contact impulse, friction included, until the latch held"),
-        "peak_contact_force": Metric("float", "N", "largest contact force, friction included, until then"),
+        "peak_contact_force": Metric(
+            "float", "N", "largest contact force, friction included, until then; as uncertain as the panels' stiffness"
+        ),
+        "docked_aligned": Metric("bool", "1", "whether it docked and lies within the dock's own limit of its axis"),
+        "final_along": Metric("float", "m", "of the nose behind the mouth, along the axis, at the end, if it docked"),
+        "final_cross": Metric("float", "m", "of the nose to starboard of the axis, then"),
+        "final_down": Metric("float", "m", "of the nose below the axis, then"),
+        "final_angle_deg": Metric("float", "deg", "between the vehicle's axis and the dock's, then"),
     }
     aftermath = 5.0
 

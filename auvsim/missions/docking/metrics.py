@@ -11,6 +11,7 @@ from auvsim.base.frames import wrap
 from auvsim.data.log import VehicleLog
 from auvsim.data.phases import latest, phase_at
 from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position
+from auvsim.vehicles.library import ALIGNED
 
 FAILURES = ("timeout", "diverged", "aborted")  # kinds of event that end a run without docking
 ENTERING = ("approach", "final", "docked")  # phases in which passing the mouth's plane is an entrance
@@ -54,8 +55,22 @@ def docking_metrics(log: VehicleLog) -> dict[str, Any]:
         "heading_error_deg": last.heading_error_deg if last else None,
         "contact_impulse": float(contact["impulse"][entry].max(initial=0.0)),
         "peak_contact_force": float(contact["force"][entry].max(initial=0.0)),
+        **_at_rest(log, docked_at),
         "crossings": [dataclasses.asdict(crossing) for crossing in passed],
     }
+
+
+def _at_rest(log: VehicleLog, docked_at: float | None) -> dict[str, Any]:
+    """Pose in the dock at the end of a trial that docked, and whether the vehicle is aligned with it then."""
+    names = ("final_along", "final_cross", "final_down", "final_angle_deg")
+    structure = log.structure
+    if docked_at is None or structure is None or not len(log["truth"]["time"]):
+        return {"docked_aligned": False} | dict.fromkeys(names)
+    nose = in_dock_frame(structure, nose_position(log)[-1:])[0].tolist()
+    _, pitch, heading = log["truth"]["attitude"][-1].tolist()
+    angle = math.acos(min(1.0, max(-1.0, math.cos(pitch) * math.cos(heading - structure.heading))))
+    within = structure.number("aligned_within", ALIGNED)
+    return {"docked_aligned": angle <= within} | dict(zip(names, (*nose, math.degrees(angle)), strict=True))
 
 
 def crossings(log: VehicleLog) -> tuple[Crossing, ...]:

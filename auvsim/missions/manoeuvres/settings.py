@@ -67,8 +67,10 @@ class MultisineSettings(_Lasting):
 
     kind: Literal["multisine"] = "multisine"
     rudder_deg: float = Field(default=10.0, gt=0, description="largest rudder [deg]")
-    lowest: float = Field(default=0.01, gt=0, description="lowest frequency; the others are its multiples [Hz]")
-    highest: float = Field(default=0.2, gt=0, description="highest frequency, below half the control rate [Hz]")
+    lowest: float = Field(default=0.01, ge=0.0001, description="lowest frequency; the others are its multiples [Hz]")
+    highest: float = Field(
+        default=0.2, gt=0, le=10.0, description="highest frequency, below half the control rate [Hz]"
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> "MultisineSettings":
@@ -82,7 +84,7 @@ class PrbsSettings(_Lasting):
 
     kind: Literal["prbs"] = "prbs"
     rudder_deg: float = Field(default=10.0, gt=0, description="rudder [deg]")
-    clock: float = Field(default=2.0, gt=0, description="shortest time on one side [s]")
+    clock: float = Field(default=2.0, ge=0.01, description="shortest time on one side [s]")
     order: int = Field(default=7, ge=3, le=11, description="bits of the register; it repeats after 2^order - 1 clocks")
 
 
@@ -91,7 +93,7 @@ class SpiralSettings(_Timed):
 
     kind: Literal["spiral"] = "spiral"
     rudder_deg: float = Field(default=12.0, gt=0, description="largest rudder [deg]")
-    step_deg: float = Field(default=3.0, gt=0, description="step of the rudder [deg]")
+    step_deg: float = Field(default=3.0, ge=0.1, description="step of the rudder [deg]")
     hold: float = Field(default=20.0, gt=0, description="time in which the yaw rate becomes steady at each step [s]")
 
     @model_validator(mode="after")

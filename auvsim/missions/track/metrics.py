@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from auvsim.base import yaml_text
+from auvsim.base.errors import InputError
 from auvsim.data.log import VehicleLog
 from auvsim.missions.track import patterns
 
@@ -16,6 +17,8 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
     The transit to the first waypoint is not a leg of the track and does not count.
     """
     mission, truth = log["mission"], log["truth"]
+    if "mission_settings" not in log.attributes:
+        raise InputError(f"the log of '{log.name}' lacks 'mission_settings', which says what its track is")
     settings = yaml_text.read(str(log.attributes["mission_settings"]), "log").value
     pattern = settings["pattern"]
     kind = patterns.LawnMower if pattern["kind"] == "lawn_mower" else patterns.Waypoints

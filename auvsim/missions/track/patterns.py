@@ -27,7 +27,7 @@ class LawnMower(Settings):
     heading_deg: float = Field(default=0.0, description="course of the first lane, clockwise from north [deg]")
     length: float = Field(default=100.0, gt=0, description="length of a lane [m]")
     spacing: float = Field(default=30.0, gt=0, description="distance between lanes [m]")
-    lanes: int = Field(default=4, ge=1, description="number of lanes")
+    lanes: int = Field(default=4, ge=1, le=10_000, description="number of lanes")
     side: Literal["starboard", "port"] = Field(default="starboard", description="side of the other lanes")
 
 

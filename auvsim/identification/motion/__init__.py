@@ -1,0 +1,1 @@
+"""Motion models of any structure from records: fit, choice by cross-validation, intervals and bands."""

@@ -1,0 +1,238 @@
+"""Which structure, by which step: compared by cross-validation, one standard error towards the simpler.
+
+Records, or where they are few their parts, are left out in turn; what was left out is predicted open loop from many
+starts. Structures are compared after least squares and after segments first, then the best with more terms and by all
+steps.
+"""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from auvsim.identification.motion import fit as fits
+from auvsim.identification.motion.data import Motion, slices
+from auvsim.identification.motion.fit import STEPS, MotionFit, Regression
+from auvsim.identification.motion.rollout import horizons, rms, roll
+from estimators.core.types import Array
+from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS, WIND, Structure
+
+HORIZON = 60.0  # of the predictions that decide [s]
+FOLDS = 4
+KEPT = 2  # structures that go on to all steps
+EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
+SHORTEST = 40.0  # of a part of a record that is left out [s]
+FIRST_STEPS = STEPS[:2]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Candidate:
+    """A structure fitted by one step, and how it predicts what was left out."""
+
+    structure: Structure
+    step: str
+    shares: tuple[Array, ...]  # of each part left out, (s, m): position error relative to the distance run
+    deviation: float  # standard error of `error` over the parts
+    converged: bool  # all of the fits
+
+    @property
+    def error(self) -> float:
+        """Position error at the horizon relative to the distance run, rms."""
+        return float(rms(self.shares)[-1])
+
+    @property
+    def parts(self) -> Array:
+        """Mean square of each part left out."""
+        return np.array([float(np.nanmean(shares[:, -1] ** 2)) for shares in self.shares])
+
+    @property
+    def size(self) -> tuple[int, float]:
+        """What makes it less simple than another: its terms; of as many, its error."""
+        return len(self.structure.terms), self.error
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Choice:
+    """What was compared, and what was kept."""
+
+    candidates: tuple[Candidate, ...]  # from the best
+    chosen: Candidate
+    horizon: float  # [s]
+    fit: MotionFit  # of the chosen one, to all of the data
+    said: str  # how it was left out
+    folds: "Folds"
+
+
+class Folds:
+    """Motions with each part left out in turn, and their fits, which are made once."""
+
+    def __init__(self, motions: Sequence[Motion], before: Mapping[str, float] | None = None) -> None:
+        self.motions = list(motions)
+        self.splits, self.said = _splits(self.motions)
+        self.equations = [fits.regression(rest, before) for rest, _ in self.splits]
+        self.whole = fits.regression(self.motions, before)
+        self.horizon = min(HORIZON, horizons([m for _, out in self.splits for m in out], (HORIZON,))[-1])
+        self._fits: dict[tuple[tuple[str, ...], str, int], MotionFit] = {}
+
+    def fit(self, structure: Structure, step: str, fold: int) -> MotionFit:
+        """A fit without one part; of the whole with the fold -1."""
+        key = structure.terms, step, fold
+        if key not in self._fits:
+            motions, equations = (
+                (self.motions, self.whole) if fold < 0 else (self.splits[fold][0], self.equations[fold])
+            )
+            self._fits[key] = self._made(structure, step, fold, motions, equations)
+        return self._fits[key]
+
+    def _made(
+        self, structure: Structure, step: str, fold: int, motions: Sequence[Motion], equations: Regression
+    ) -> MotionFit:
+        if step == STEPS[0]:
+            return fits.least_squares(motions, structure, equations)
+        guess = self.fit(structure, STEPS[STEPS.index(step) - 1], fold)
+        like = self.fit(structure, step, -1) if fold >= 0 else None
+        return fits.segments(motions, guess, step, equations, like=like)
+
+    def candidate(self, structure: Structure, step: str) -> Candidate:
+        """Fits without each part, and their predictions of it."""
+        shares, converged = [], self.fit(structure, step, -1).converged
+        for fold, (_, out) in enumerate(self.splits):
+            found = self.fit(structure, step, fold)
+            converged &= found.converged
+            rolled = [roll(found.vector, motion, (self.horizon,)).shares for motion in out]
+            shares += [share for share in rolled if np.isfinite(share[:, -1]).any()]  # not of what is too short
+        parts = np.array([np.nanmean(share[:, -1] ** 2) for share in shares])
+        error = math.sqrt(float(parts.mean()))
+        deviation = float(parts.std(ddof=1)) / math.sqrt(len(parts)) / (2.0 * error) if len(parts) > 1 else math.inf
+        return Candidate(
+            structure=structure, step=step, shares=tuple(shares), deviation=deviation, converged=converged
+        )  # fmt: skip
+
+
+def choose(
+    motions: Sequence[Motion],
+    structures: Sequence[Structure] = STRUCTURES,
+    *,
+    before: Mapping[str, float] | None = None,
+    quick: bool = False,
+    progress: Callable[[str, float], None] | None = None,
+) -> Choice:
+    """Compares structures and steps, and fits the chosen one to all of the data.
+
+    Args:
+        motions: What was measured.
+        structures: From the simplest; wind and asymmetry are added to the best.
+        before: Coefficients that are known before, see `dimensions`.
+        quick: Fewer structures go on to fewer steps.
+        progress: Called with what is being done and the share that is done.
+    """
+    say = progress or (lambda text, share: None)
+    folds = Folds(motions, before)
+    windy = any(np.any(motion.record.inputs[:, 2:]) for motion in motions)
+    bases = [seen(folds.whole, with_terms(structure, WIND if windy else ())) for structure in structures]
+    found: list[Candidate] = []
+    first = FIRST_STEPS[:1] if quick else FIRST_STEPS
+    for number, structure in enumerate(bases):
+        say(f"cross-validation: {structure.name}", 0.5 * number / len(bases))
+        found += [folds.candidate(structure, step) for step in first]
+    if windy:  # a docking filter knows no wind
+        calm = [seen(folds.whole, structure) for structure in structures if set(structure.terms) <= set(PLANAR)]
+        found += [folds.candidate(structure, FIRST_STEPS[0]) for structure in calm]
+    best = _ranked(found)[0].structure
+    more = [with_terms(best, ASYMMETRY)]
+    if windy:
+        more.append(replace(best, name=best.name.replace(" and wind", ""), terms=_without(best.terms, WIND)))
+    for number, structure in enumerate(more):
+        say(f"cross-validation: {structure.name}", 0.5 + 0.1 * number)
+        found += [folds.candidate(seen(folds.whole, structure), step) for step in first]
+    last = list({c.structure.name: c.structure for c in _ranked(found)}.values())[: 1 if quick else KEPT]
+    steps = STEPS[1:2] if quick else STEPS[2:]
+    for number, structure in enumerate(last):
+        for step in steps:
+            say(f"{structure.name}: {step}", 0.7 + 0.25 * number / len(last))
+            found.append(folds.candidate(structure, step))
+    ranked = _ranked(found)
+    chosen = simplest(ranked)
+    return Choice(
+        candidates=tuple(ranked), chosen=chosen, horizon=folds.horizon, said=folds.said, folds=folds,
+        fit=folds.fit(chosen.structure, chosen.step, -1),
+    )  # fmt: skip
+
+
+def simplest(ranked: Sequence[Candidate]) -> Candidate:
+    """The simplest of those as good as the best: within a standard error of the difference, and within EQUAL.
+
+    What has not converged is kept only if nothing else is there.
+    """
+    settled = [candidate for candidate in ranked if candidate.converged] or list(ranked)
+    best = settled[0]
+    good = [best]
+    for other in settled[1:]:
+        away = other.parts - best.parts
+        error = float(away.std(ddof=1)) / math.sqrt(len(away)) if len(away) > 1 else 0.0
+        if float(away.mean()) <= error and other.error <= (1.0 + EQUAL) * best.error:
+            good.append(other)
+    return min(good, key=lambda candidate: candidate.size)
+
+
+def with_terms(structure: Structure, terms: Sequence[str]) -> Structure:
+    """A structure with more terms."""
+    if not terms:
+        return structure
+    names = {WIND: "wind", ASYMMETRY: "asymmetry"}
+    chosen = {*structure.terms, *terms}
+    return Structure(
+        name=f"{structure.name} and {names.get(tuple(terms), 'more')}", terms=tuple(t for t in LABELS if t in chosen)
+    )
+
+
+def seen(equations: Regression, structure: Structure) -> Structure:
+    """The structure without terms that the data never move or that others make up, such as n|n| of a steady shaft."""
+    kept: list[str] = []
+    for axis in range(3):
+        own = [label for label in structure.terms if TERMS[LABELS.index(label)].axis == axis]
+        columns = equations.terms[:, axis, [LABELS.index(label) for label in own]]
+        for label, column in zip(own, columns.T, strict=True):
+            size = float(np.linalg.norm(column))
+            if size == 0.0:
+                continue
+            basis = equations.terms[:, axis, [LABELS.index(k) for k in kept if TERMS[LABELS.index(k)].axis == axis]]
+            rest = column
+            if basis.shape[1]:
+                scaled = basis / np.linalg.norm(basis, axis=0)
+                rest = column - scaled @ np.linalg.lstsq(scaled, column, rcond=1e-10)[0]
+            if float(np.linalg.norm(rest)) > 1e-4 * size:
+                kept.append(label)
+    return replace(structure, terms=tuple(kept))
+
+
+def _without(terms: Sequence[str], out: Sequence[str]) -> tuple[str, ...]:
+    return tuple(term for term in terms if term not in out)
+
+
+def _ranked(found: Sequence[Candidate]) -> list[Candidate]:
+    return sorted(found, key=lambda candidate: candidate.error)
+
+
+def _splits(motions: Sequence[Motion]) -> tuple[list[tuple[list[Motion], list[Motion]]], str]:
+    """What is fitted and what is left out, each time; and how that is said."""
+    long = [motion for motion in motions if motion.duration >= SHORTEST]
+    if len(long) >= 3:
+        groups = [long[k::FOLDS] for k in range(min(FOLDS, len(long)))]
+        said = f"{len(groups)} groups of whole records left out in turn"
+        return [([m for m in motions if all(m is not o for o in out)], out) for out in groups], said
+    splits = []
+    for motion in long or motions:
+        count = len(motion.record.times)
+        parts = max(1, min(FOLDS, int(motion.duration // (2.0 * SHORTEST))))
+        if parts == 1 and len(motions) == 1:
+            parts = 2
+        edges = np.linspace(0, count, parts + 1).astype(int)
+        for start, stop in pairwise(edges.tolist()):
+            rest = [m for m in motions if m is not motion]
+            rest += [slices(motion, a, b) for a, b in ((0, start), (stop, count)) if b - a > 20]
+            if rest:
+                splits.append((rest, [slices(motion, start, stop)]))
+    return splits, f"{len(splits)} parts of records left out in turn"
