@@ -34,6 +34,7 @@ class UsblSettings(Settings):
     The noise table is the square root of the USBL variances in table 1 of Qiu & Li 2019.
     """
 
+    enabled: bool = Field(default=True, description="whether a dock's USBL serves the vehicle")
     dock: str | None = Field(
         default=None, description="structure that serves the vehicle; none: its mission's dock, or the only one"
     )

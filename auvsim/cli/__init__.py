@@ -223,6 +223,39 @@ class Identify:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Estimate:
+    """Runs logs through estimators again, side by side, also with more losses, delays and outliers.
+
+    A log is a trial's, or a CSV or NetCDF file with the columns of `auvsim identify`. Unchanged, a trial's own
+    estimator gives the trial's estimates bit for bit. Prints errors and NEES where there is truth, and NIS and
+    whiteness by sensor. With --out: estimators.csv, and of each log a page (PNG) and the estimates of each estimator.
+    """
+
+    logs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LOG...")]
+    """Logs of trials, or tables."""
+    estimator: Annotated[tuple[str, ...], tyro.conf.arg(metavar="NAME|PACKAGE.MODULE:FACTORY...")] = ()
+    """Estimators; by default the trial's own, and of tables dead_reckoning."""
+    drop: str = "0%"
+    """Share of readings that are lost besides."""
+    delay: str = "+0"
+    """Time by which readings arrive later [s]."""
+    outliers: str = "0%"
+    """Share of readings that get an error of 10 to 30 m, or of their unit."""
+    sensors: tuple[str, ...] = ()
+    """Sensors that those three change; by default all that fix the position."""
+    seed: int = 0
+    """Seed of what is lost and wrong."""
+    smooth: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Also refine each pose by what came in the 15 to 25 s after it."""
+    out: Path | None = None
+    """Folder of estimators.csv, the pages and the estimates; by default nothing is written."""
+    columns: Annotated[Path | None, tyro.conf.arg(metavar="MAP.yaml")] = None
+    """Which column of a table is what, as of `auvsim identify`."""
+    vehicle: str = "remus100"
+    """Vehicle of a table, for estimators that assume its model."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """Runs one of the studies behind the figures of the README; without a name lists them."""
 
@@ -234,6 +267,7 @@ Command = (
     | Report
     | Manoeuvre
     | Identify
+    | Estimate
     | Video
     | Plot
     | Metrics
@@ -372,6 +406,19 @@ def _run(arguments: list[str]) -> int:
             command.logs, out=command.out, holdout=command.holdout, columns=command.columns,
             vehicle=command.vehicle, name=command.name, steps=command.steps, quick=command.quick,
             hull=(command.length, command.beam, command.draught, command.mass), motion=command.motion,
+        )  # fmt: skip
+
+    if isinstance(command, Estimate):
+        from auvsim.cli import estimate
+        from auvsim.replay.what_if import WhatIf
+
+        what_if = WhatIf(
+            drop=estimate.share(command.drop, "--drop"), delay=estimate.delay(command.delay),
+            outliers=estimate.share(command.outliers, "--outliers"), sensors=command.sensors, seed=command.seed,
+        )  # fmt: skip
+        return estimate.run(
+            command.logs, estimators=command.estimator, what_if=what_if, smooth=command.smooth, out=command.out,
+            columns=command.columns, vehicle=command.vehicle,
         )  # fmt: skip
 
     if isinstance(command, Reproduce):

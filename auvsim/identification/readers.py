@@ -48,7 +48,7 @@ def read(
 def _signals(
     path: Path, mapping: dict[str, ColumnSettings], vehicle: str | None
 ) -> tuple[list[signals.Signals], list[str]]:
-    if not _is_trial_log(path):
+    if not is_trial_log(path):
         return table_records.signals(path, mapping, shaft=vehicle is not None)
     found, notes, model = log_records.signals(path)
     if vehicle is not None and model != vehicle:
@@ -58,10 +58,11 @@ def _signals(
 
 def models(paths: Sequence[Path]) -> set[str]:
     """Vehicles of those of the files that are trial logs."""
-    return {log_records.signals(path)[2] for path in paths if _is_trial_log(path)}
+    return {log_records.signals(path)[2] for path in paths if is_trial_log(path)}
 
 
-def _is_trial_log(path: Path) -> bool:
+def is_trial_log(path: Path) -> bool:
+    """Whether a file is a log of auvsim's, whole or not."""
     try:
         with h5py.File(path, "r") as file:
             return "format_version" in file.attrs and "scenario" in file.attrs

@@ -17,7 +17,7 @@ from auvsim.identification.table_files import Column, load
 from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
-_NEEDED = ("time", "rudder", "shaft_speed")
+NEEDED = ("time", "rudder", "shaft_speed")
 _EXAMPLES = {"time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]"}
 
 
@@ -41,7 +41,7 @@ class _Table(NamedTuple):
 
 
 def signals(
-    path: Path, mapping: Mapping[str, ColumnSettings], *, shaft: bool = True
+    path: Path, mapping: Mapping[str, ColumnSettings], *, shaft: bool = True, inputs: bool = True
 ) -> tuple[list[Signals], list[str]]:
     """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
 
@@ -49,6 +49,7 @@ def signals(
         path: CSV or NetCDF.
         mapping: What columns mean, where their names do not say it.
         shaft: Whether the shaft speed must be there; else its thrust counts as constant.
+        inputs: Whether rudder and shaft speed must be there at all.
 
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
@@ -62,29 +63,29 @@ def signals(
         for name, s in mapping.items()
         if s.constant is not None
     }
-    if not shaft and "shaft_speed" not in by_quantity:
+    if not shaft and inputs and "shaft_speed" not in by_quantity:
         constants.setdefault("shaft_speed", 0.0)
-    _require(path, by_quantity.keys() | constants.keys(), list(columns))
+    _require(path, by_quantity.keys() | constants.keys(), list(columns), NEEDED if inputs else NEEDED[:1])
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
     time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
     table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time))
     notes = list(_assumptions(table, unknown))
-    if "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
+    if inputs and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
         notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
     found = []
     pieces = list(_pieces(table))
     for number, piece in enumerate(pieces, start=1):
         label = path.name if len(pieces) == 1 else f"{path.name}, {piece.kind or f'part {number}'}"
-        one, more = _signals(table, piece, label)
+        one, more = _signals(table, piece, label, inputs)
         found += [one] if one is not None else []
         notes += more
     return found, notes
 
 
-def _require(path: Path, there: set[str], columns: Sequence[str]) -> None:
+def _require(path: Path, there: set[str], columns: Sequence[str], needed: Sequence[str]) -> None:
     there = there | ({"rudder"} if "rudder_command" in there else set())
-    for quantity in _NEEDED:
+    for quantity in needed:
         if quantity not in there:
             raise InputError(
                 f"{path}: no column is the {quantity.replace('_', ' ')}; there are {', '.join(columns)}; "
@@ -138,7 +139,7 @@ def _pieces(table: _Table) -> Iterator[_Piece]:
             yield _Piece(slice(start, stop), float(inside.min()), float(inside.max()), kind)
 
 
-def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, list[str]]:
+def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Signals | None, list[str]]:
     found: dict[str, Signal] = {}
     deviations: dict[str, float] = {}
     notes: list[str] = []
@@ -164,7 +165,7 @@ def _signals(table: _Table, piece: _Piece, label: str) -> tuple[Signals | None, 
         found[quantity] = Signal(times=ends, values=np.full(3, value))
     _combine(found)
     _wind(found)
-    lacking = [quantity for quantity in ("rudder", "shaft_speed") if quantity not in found]
+    lacking = [quantity for quantity in NEEDED[1:] if quantity not in found] if inputs else []
     if lacking:
         return None, [*notes, f"{label}: left out: no {' and no '.join(lacking)} in it"]
     for quantity in set(MEASURED) & found.keys() - {"north", "east"}:

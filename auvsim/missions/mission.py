@@ -55,6 +55,8 @@ class MissionSetup:
     period: float  # time between two updates [s]
     holds: Callable[[float], bool]  # whether the vehicle can hold a speed through the water [m/s]
     structures: Mapping[str, Place]  # all that are charted, by name
+    usbl: bool = True  # whether a dock reports where it lies
+    ranges: tuple[str, ...] = ()  # names of the sensors that measure ranges to beacons
 
 
 class Metric(NamedTuple):

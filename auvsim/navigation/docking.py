@@ -13,10 +13,17 @@ from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, wrap
 from auvsim.base.reading import Reading
+from auvsim.navigation import aids
 from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
+from estimators.core.estimator import StateFilter
+from estimators.core.history import Node
 from estimators.core.outliers import Outliers
+from estimators.core.types import Gaussian
 from estimators.docking.estimator import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
 from estimators.docking.models import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.docking.usbl import UsblFix, UsblModel
@@ -24,6 +31,9 @@ from estimators.docking.usbl import UsblFix, UsblModel
 TURN = 10.0  # mean duration of a turn of the current that the interacting filters expect [s]
 SETTLING = 50.0  # mean time after it for which its memory is kept apart [s]
 DEPTH_GAINS = (0.09, 0.0042)  # of the depth gauge's alpha-beta filter, steady state for 0.05 m and 0.02 m/s2
+# Of the position where a DVL tells the velocity [m2/s]: its errors of scale and mounting are no constants, but turn and
+# grow with the velocity, and the model's surge is not level in a dive. Without it the filter believed itself too much.
+DOPPLER_WALK = 4e-4
 # An acoustic fix is right or wrong by many metres; one that is wrong by a few would be taken for the start of a turn.
 GROSS = Outliers(prior=0.02, deviations=(15.0,))
 ANY = Outliers(prior=0.03, deviations=(2.0, 15.0))  # where fixes may be wrong by a few metres all the same
@@ -33,19 +43,22 @@ class DockingNavigator:
     """A docking estimator in a run.
 
     Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
-    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. Depth is the
-    gauge's, smoothed.
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. So do
+    ranges, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed.
 
     Args:
         estimator: in whose axes the dock's mouth is the origin.
         actuation: of the vehicle.
         dock: (2,) north, east of the dock's mouth [m].
+        aids: settings of the sensors it uses besides, by name.
     """
 
     states = PLANAR_STATES
 
-    def __init__(self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array) -> None:
-        self._estimator, self._actuation, self._dock = estimator, actuation, dock
+    def __init__(
+        self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array, aids: Mapping[str, Any] | None = None
+    ) -> None:
+        self._estimator, self._actuation, self._dock, self._aids = estimator, actuation, dock, dict(aids or {})
         self.reset()
 
     def reset(self) -> None:
@@ -53,15 +66,18 @@ class DockingNavigator:
         self._estimator.reset()
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._yaw_rate = 0.0
+        self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
 
     def update(
         self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
     ) -> Estimate:
         """The estimate at `time`, see `Navigator.update`."""
         headings, stamps, drives, fixes = [], [], [], []
+        aided: dict[Any, Reading] = {}  # the last reading of a sensor, but every range
         for reading in readings:
             if reading.sensor == "compass":
                 headings.append(float(reading.value[0]))
+                self._tilt = (float(reading.value[1]), float(reading.value[2]))
                 stamps.append(reading.stamp)
             elif reading.sensor == "feedback":
                 drives.append(reading.value.tolist())
@@ -74,12 +90,18 @@ class DockingNavigator:
                     position=(x, y, z), heading=heading, pitch=pitch, roll=roll,
                 )  # fmt: skip
                 fixes.append(fix)
+            elif reading.sensor in self._aids:
+                is_range = isinstance(self._aids[reading.sensor], RangeSettings)
+                aided[reading.sensor, reading.sequence if is_range else None] = reading
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
             rudder, _, shaft_speed = self._actuation.effective(
                 [sum(values) / len(drives) for values in zip(*drives, strict=True)]
             )
-        result = self._estimator.tick(time, self._heading_now(time, headings, stamps), rudder, shaft_speed, fixes)
+        depth, origin = self._depth.value or 0.0, (float(self._dock[0]), float(self._dock[1]))
+        more = [m for r in aided.values() for m in measurements(r, self._aids[r.sensor], depth, origin, self._tilt)]
+        heading = self._heading_now(time, headings, stamps)
+        result = self._estimator.tick(time, heading, rudder, shaft_speed, fixes, more)
         mean = result.mean.copy()
         mean[:2] += self._dock
         self._yaw_rate = float(mean[5])
@@ -98,6 +120,26 @@ class DockingNavigator:
             outcomes=result.outcomes,
         )
 
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """See `Buffered`."""
+        return self._estimator.nodes
+
+    @property
+    def filter(self) -> StateFilter:
+        """See `Buffered`."""
+        return self._estimator.filter
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """See `Buffered`."""
+        shift = np.zeros(len(self.states))
+        shift[:2] = self._dock
+        n = shift.size
+        return [
+            (time, Gaussian(mean=b.mean[:n] + shift, covariance=b.covariance[:n, :n]))
+            for time, b in self._estimator.smoothed()
+        ]
+
     def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:
         if not headings:
             return None
@@ -111,17 +153,27 @@ def navigator(
 ) -> DockingNavigator:
     """A docking filter for a vehicle; what it assumes are the estimator's settings, never the sensors' draws."""
     s, actuation = setup.settings, setup.actuation
+    used = aids.used(setup.sensors, getattr(s, "use", ()))
     if setup.dock is None:
-        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': needs the USBL of a dock; give a structure")
+        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': needs the place of a dock; give a structure")
+    if not setup.usbl.enabled and len(of_kind(used, RangeSettings)) < 2:
+        raise InputError(
+            f"estimator '{s.kind}' of '{setup.vehicle}': without USBL it needs ranges to two beacons or more; "
+            "give sensors of kind range, or sensors.usbl.enabled: true"
+        )
     if not isinstance(actuation, FinsAndShaft):
         raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft")
     readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
-    noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings))
+    biases = {**aids.biases(used, setup.sensors.get("compass")), **base.biases}
+    noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings), biases=biases)
+    if of_kind(used, DvlSettings):
+        noise = replace(noise, position=max(noise.position, DOPPLER_WALK))
     white = 0.0 if "dock_heading" in base.biases else math.radians(s.dock_heading_deg)
     model = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=white)
-    filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2])
+    more = {"aids": aids.assumed(used)} if used else {}
+    filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2], **more)
     estimator = DockingEstimator(filter_, model, step=setup.period, compensate_delay=delayed)
-    return DockingNavigator(estimator, actuation, setup.dock.position[:2])
+    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used)
 
 
 def regular_ekf(setup: NavigatorSetup) -> Navigator:

@@ -1,8 +1,8 @@
 """The contract of an estimator in a run, and the set-up that it is made from."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any, Protocol, runtime_checkable
 
 from auvsim.acoustics.message import Delivery
 from auvsim.acoustics.usbl import UsblSettings
@@ -10,6 +10,9 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
 from auvsim.physics.truth import StructurePose
 from auvsim.vehicles.actuation import Actuation
+from estimators.core.estimator import StateFilter
+from estimators.core.history import Node
+from estimators.core.types import Gaussian
 from estimators.planar.model import PlanarParameters
 
 
@@ -34,6 +37,29 @@ class Navigator(Protocol):
         ...
 
 
+@runtime_checkable
+class Buffered(Protocol):
+    """A navigator with a delay buffer, of which innovations and refined poses are to be had."""
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """The delay buffer."""
+        ...
+
+    @property
+    def filter(self) -> StateFilter:
+        """What runs over it."""
+        ...
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """Times [s] and beliefs of the nodes still kept, given all that arrived since; NED from the datum.
+
+        Raises:
+            ParameterError: The filter cannot be smoothed.
+        """
+        ...
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class NavigatorSetup:
     """What an estimator may know before the start; never the errors that its sensors drew."""
@@ -46,6 +72,7 @@ class NavigatorSetup:
     rates: Mapping[str, float]  # of the sensors that the vehicle has, by name [Hz]
     usbl: UsblSettings  # lever arms of the dock's USBL
     dock: StructurePose | None = None  # charted pose of the mission's dock
+    sensors: Mapping[str, Any] = field(default_factory=dict)  # settings of those on board by name: data sheets, places
 
 
 NavigatorFactory = Callable[[NavigatorSetup], Navigator]

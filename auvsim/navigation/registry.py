@@ -7,7 +7,7 @@ from typing import Any
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
-from auvsim.navigation import docking
+from auvsim.navigation import docking, reckoning
 from auvsim.navigation.navigator import Navigator, NavigatorFactory, NavigatorSetup
 
 _SHIPPED: tuple[NavigatorFactory, ...] = (
@@ -20,7 +20,11 @@ _SHIPPED: tuple[NavigatorFactory, ...] = (
     docking.delay_only,
     docking.regular_ekf,
 )
-ESTIMATORS: dict[str, NavigatorFactory] = {factory.__name__: factory for factory in _SHIPPED}
+ESTIMATORS: dict[str, NavigatorFactory] = {  # of docking
+    factory.__name__: factory for factory in _SHIPPED
+}
+GENERAL: dict[str, NavigatorFactory] = {"dead_reckoning": reckoning.dead_reckoning}  # that need no dock
+ALL = {**ESTIMATORS, **GENERAL}
 
 
 def build(setup: NavigatorSetup) -> Navigator:
@@ -30,7 +34,7 @@ def build(setup: NavigatorSetup) -> Navigator:
         InputError: there is no such factory, or it does not return a Navigator.
     """
     kind = setup.settings.kind
-    factory = plugins.find("estimator", kind, ESTIMATORS)
+    factory = plugins.find("estimator", kind, ALL)
     if not callable(factory):
         raise InputError(f"estimator '{kind}' is not callable; it must be factory(setup) -> Navigator")
     if plugins.is_own(kind):

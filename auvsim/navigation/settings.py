@@ -32,8 +32,8 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, paper, current_only, delay_only, regular_ekf, or "
-        "package.module:factory",
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, "
+        "regular_ekf, module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
@@ -46,6 +46,9 @@ class AugmentedSettings(_Assumed):
     dock_heading_deg: float = Field(default=0.3, ge=0, description="assumed error of the dock's compass, sd [deg]")
     dock_heading_state: bool = Field(
         default=True, description="whether that error is a constant, which is estimated, or white noise of each fix"
+    )
+    use: tuple[Literal["gyro", "dvl", "range"], ...] = Field(
+        default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass and USBL"
     )
 
 
@@ -65,6 +68,16 @@ class InteractingSettings(AugmentedSettings):
     )
 
 
+class ReckoningSettings(_Assumed):
+    """Dead reckoning by DVL, gyro and compass, with fixes and ranges; it needs no model of the vehicle."""
+
+    kind: Literal["dead_reckoning"] = "dead_reckoning"
+    acceleration: float = Field(default=0.01, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_acceleration: float = Field(default=0.01, ge=0, description="process noise of yaw rate [rad2/s3]")
+    compass_error_deg: float = Field(default=1.0, gt=0, description="constant error of the compass it estimates [deg]")
+    dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+
+
 class OwnEstimator(OwnPart, _Assumed):
     """An estimator of the user's own, made by a factory."""
 
@@ -73,6 +86,7 @@ EstimatorSettings = Annotated[
     Annotated[AugmentedSettings, Tag("AugmentedSettings")]
     | Annotated[InteractingSettings, Tag("InteractingSettings")]
     | Annotated[PaperSettings, Tag("PaperSettings")]
+    | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
-    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, OwnEstimator)),
+    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, OwnEstimator)),
 ]

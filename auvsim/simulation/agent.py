@@ -16,18 +16,22 @@ from auvsim.missions import registry as missions
 from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
-from auvsim.navigation.navigator import Navigator, NavigatorSetup
-from auvsim.physics import planar_sets
+from auvsim.navigation.gate import Gate
+from auvsim.navigation.measurements import of_kind
+from auvsim.navigation.navigator import Navigator
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
+from auvsim.sensors.range import RangeSettings
 from auvsim.sensors.sensor import Surroundings
 from auvsim.simulation import parts
 from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
-from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.simulation.sensor_settings import on_board
+from auvsim.simulation.setups import model_speed, navigator_setup, usbl_dock
 from auvsim.simulation.stretches import Stretches
 from auvsim.vehicles.library import Vehicle
+from estimators.core.types import Outcome
 
 
 class Log(Protocol):
@@ -75,14 +79,14 @@ class Agent:
     ) -> None:
         self.name, self.vehicle = name, vehicle
         settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
-        start, assumed = settings.start, settings.estimator
-        model_speed = getattr(assumed, "model_speed", 1.0)
+        start = settings.start
         # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
         # estimator.
-        fitted = fit_planar_model(settings.model, model_speed, density)
+        fitted = fit_planar_model(settings.model, model_speed(settings.estimator), density)
         self.shaft_speed = fitted.shaft_speed_for
         heading = math.radians(start.heading_deg)
-        self.dock = plan.dock_of(name, settings.sensors.usbl.dock)  # whose USBL serves it
+        self.dock = usbl_dock(plan, name)
+        self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does
         self.mission = mission or missions.build(
             settings.mission.kind,
             MissionSetup(
@@ -94,20 +98,11 @@ class Agent:
                 period=1.0 / rates.control,
                 holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
                 structures=places,
+                usbl=self.serves,
+                ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
             ),
         )
-        self.navigator = navigator or estimators.build(
-            NavigatorSetup(
-                vehicle=name,
-                settings=assumed,
-                parameters=planar_sets.assumed(assumed.model, settings.model, model_speed, density),
-                actuation=vehicle.actuation,
-                period=1.0 / rates.filter,
-                rates=dict(rated(settings.sensors)),
-                usbl=settings.sensors.usbl,
-                dock=places[self.dock].pose if self.dock else None,
-            )
-        )
+        self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
         self.controller = controllers.build(
             settings.control.kind,
             ControllerSetup(
@@ -125,8 +120,10 @@ class Agent:
             )
             for key, found in on_board(settings.sensors)
         ]
+        self.gate = Gate(dict(on_board(settings.sensors)), vehicle.actuation)
+        self._gated: list[Outcome] = []  # refused by it since the last update of the estimator
         # Whatever is given in place of the scenario's part is the caller's, who sees what it raises.
-        self._estimator = Part("estimator", "" if navigator else assumed.kind, name)
+        self._estimator = Part("estimator", "" if navigator else settings.estimator.kind, name)
         self._mission = Part("mission", "" if mission else settings.mission.kind, name)
         self._controller = Part("controller", settings.control.kind, name)
         self.estimate: Estimate | None = None
@@ -168,7 +165,7 @@ class Agent:
 
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
         """Takes the readings that are due at a control tick."""
-        self._readings, self._messages = [], []
+        taken, self._messages = [], []
         for sensor, every, part in self.sensors:
             if ticks % every:
                 continue
@@ -178,7 +175,18 @@ class Agent:
                 if part.own:
                     parts.reading(reading, sensor)
                 log.reading(self.name, reading)
-                self._readings.append(reading)
+                taken.append(reading)
+        suspect = dict(self.gate.refused)
+        self._readings, refused = self.gate.passed(taken)
+        self._gated += refused
+        for outcome in refused:
+            if outcome.kind not in suspect:
+                text = f"readings of {outcome.kind}: {outcome.reason.replace('_', ' ')}"
+                log.event(truth.time, self.name, "refused", text)
+        for reading in self._readings if suspect else ():
+            if (count := self.gate.refused.pop(reading.sensor, 0)) > 0:
+                text = f"{reading.sensor} is heard again; {count} reading{'s' * (count > 1)} refused"
+                log.event(truth.time, self.name, "heard", text)
 
     def receive(self, deliveries: Sequence[Delivery]) -> None:
         """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
@@ -208,8 +216,10 @@ class Agent:
         self.estimate = e
         views = (e.position, e.heading, e.velocity, e.current)
         log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
-        for o in e.outcomes:
-            log.append(self._measurements, (time, o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis))
+        outcomes, self._gated = (*self._gated, *e.outcomes), []
+        for o in outcomes:
+            row = (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
+            log.append(self._measurements, row)
 
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""

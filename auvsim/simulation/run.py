@@ -140,7 +140,7 @@ class Simulation:
             )
             for name, settings in scenario.vehicles.items()
         ]  # fmt: skip
-        self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.dock]
+        self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.serves]
         links = {
             usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
         }
@@ -315,14 +315,14 @@ class Simulation:
             "mission": settings.mission.kind,
             "mission_settings": yaml_text.dump(settings.mission.model_dump(mode="json")),
             "dock": agent.mission.dock.name if agent.mission.dock else "",
-            "usbl_structure": agent.dock or "",
+            "usbl_structure": (agent.dock if agent.serves else None) or "",
         }
 
     def _attributes_of_structure(self, name: str) -> dict[str, Any]:
         """Attributes of a structure in the log; its transceiver is that of the first vehicle that it serves."""
         settings = self.scenario.structures[name]
         place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
-        served = next((agent.name for agent in self.agents if agent.dock == name), None)
+        served = next((agent.name for agent in self.agents if agent.serves and agent.dock == name), None)
         transceiver = self.scenario.vehicles[served].sensors.usbl.transceiver if served else ()
         axes = ("transceiver_forward", "transceiver_starboard", "transceiver_down")
         return {

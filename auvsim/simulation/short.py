@@ -109,7 +109,8 @@ def _of_a_kind(estimator: Mapping) -> dict:
     rest = {key: value for key, value in estimator.items() if key != "factory"}
     of_all = {key for model in schema.members(EstimatorSettings) for key in model.model_fields}
     known = estimator_keys(str(kind)) or of_all
-    return {"kind": kind} | {key: value for key, value in rest.items() if key in known or key not in of_all}
+    heeded = {"use": []} if "use" in (known or of_all) else {}  # then, no estimator heeded gyro or DVL
+    return {"kind": kind} | heeded | {key: value for key, value in rest.items() if key in known or key not in of_all}
 
 
 def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:

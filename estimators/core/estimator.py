@@ -6,13 +6,15 @@ from operator import attrgetter
 from typing import Any, Protocol
 
 from estimators.core import smoothing
-from estimators.core.history import Filter, History
+from estimators.core.history import Filter, History, Node
 from estimators.core.screening import Limits, Screen
-from estimators.core.types import Gaussian, Measurement, Outcome, ProcessModel
+from estimators.core.types import Gaussian, Measurement, Models, Outcome, ProcessModel
 
 
 class StateFilter(Filter[Any], Protocol):
     """A filter for an `Estimator`; its states have `belief`, `outliers` and `verdicts`."""
+
+    sensors: Models  # what each kind of measurement shows
 
     def process_after(self, state: Any) -> ProcessModel:
         """The process by which it went on from a state, for `smoothing`; ParameterError if there is none that fits."""
@@ -43,16 +45,21 @@ class Estimator:
     def __init__(
         self, filter: StateFilter, *, step: float, keep: float = 30.0, limits: Mapping[str, Limits] | None = None
     ) -> None:
-        self._filter, self._step, self._keep, self._limits = filter, step, keep, dict(limits or {})
+        self.filter, self._step, self._keep, self._limits = filter, step, keep, dict(limits or {})
         self.reset()
 
     def reset(self) -> None:
         """Forgets everything, counts included."""
         self.history: History[Any] = History(
-            self._filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
+            self.filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
         )
         self._screens: dict[tuple[str, str], Screen] = {}
         self._restarts = self._outliers_before = self._outliers = 0
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """The delay buffer."""
+        return self.history.nodes
 
     def tick(self, time: float, u: Sequence[float] = (), measurements: Sequence[Measurement] = ()) -> Estimate:
         """One step of the filter.
@@ -88,7 +95,7 @@ class Estimator:
     def smoothed(self) -> list[tuple[float, Gaussian]]:
         """Times [s] and beliefs of the nodes still kept, given all that arrived since: a fixed-lag smoother."""
         nodes = self.history.nodes
-        beliefs = smoothing.smooth(nodes, self._filter.process_after)
+        beliefs = smoothing.smooth(nodes, self.filter.process_after)
         return [(node.time, belief) for node, belief in zip(nodes[len(nodes) - len(beliefs) :], beliefs, strict=True)]
 
     def _screened(self, measurement: Measurement) -> str:

@@ -56,6 +56,7 @@ class ModelFilter:
         gates: Probability with which a measurement that fits is accepted: of every kind, or by kind; None: no gate.
         mixtures: Kinds that are weighed against being outliers instead of gated.
         recovery: What to do about a source that is rejected again and again; None: nothing.
+        recoveries: The same of some kinds.
         transform: "extended", "unscented", or "iterated" where a measurement says more of a state than its belief.
     """
 
@@ -68,13 +69,14 @@ class ModelFilter:
         gates: float | Mapping[str, float | None] | None = None,
         mixtures: Mapping[str, Outliers] | None = None,
         recovery: Recovery | None = Readmission(),  # noqa: B008 - immutable
+        recoveries: Mapping[str, Recovery] | None = None,
         transform: Transform = "extended",
     ) -> None:
         if transform not in TRANSFORMS:
             raise ParameterError(f"no transform '{transform}'; there are {', '.join(TRANSFORMS)}")
         kinds = {key if isinstance(key, str) else key[0] for key in sensors}
         self.process, self.sensors, self.recovery = process, sensors, recovery
-        self._start = start
+        self._start, self._recoveries = start, dict(recoveries or {})
         self._gates = (
             dict(gates) if isinstance(gates, Mapping) else {} if gates is None else dict.fromkeys(kinds, gates)
         )
@@ -133,37 +135,18 @@ class ModelFilter:
         H = model.jacobian(state.belief.mean, measurement)
         now = Rejected(measurement, innovation.residual, H, nis, innovation)
         rest = without(state.rejected, own)
-        if self.recovery is not None:
-            found = self.recovery.agreeing(now, own)
-            if self.recovery.suffice(now, own, found):
-                return self._recovered(state, found[0], now, model, rest, accepted, 1)
+        recovery = self._recoveries.get(measurement.kind, self.recovery)
+        if recovery is not None:
+            found = recovery.agreeing(now, own)
+            if recovery.suffice(now, own, found):
+                return _recovered(recovery, state, found[0], now, model, rest, accepted, 1)
         if innovation.accepted:
             return FilterState(belief, state.outliers, rest, innovation, accepted)
-        if self.recovery is not None and self.recovery.forces and len(own) >= REMEMBERED:
-            return self._recovered(state, own[-1], now, model, rest, accepted, 0)
+        if recovery is not None and recovery.forces and len(own) >= REMEMBERED:
+            return _recovered(recovery, state, own[-1], now, model, rest, accepted, 0)
         verdicts = (*verdicts, (measurement, OUTLIER, nis))
         rejected = (*rest, *own[1 - REMEMBERED :], now) if len(own) >= REMEMBERED else (*state.rejected, now)
         return FilterState(state.belief, state.outliers + 1, rejected, innovation, verdicts)
-
-    def _recovered(
-        self,
-        state: FilterState,
-        earlier: Rejected,
-        now: Rejected,
-        model: MeasurementModel,
-        rest: tuple[Rejected, ...],
-        accepted: Verdicts,
-        confirmed: int,
-    ) -> FilterState:
-        assert self.recovery is not None
-        belief = self.recovery.recover(state.belief, earlier, now, model)
-        if self.recovery.fuses_both:
-            return FilterState(belief, state.outliers - confirmed, rest, now.innovation, (*accepted, earlier.taken))
-        # What is remembered of the source is from now on seen from the belief that has followed it.
-        moved = belief.mean - state.belief.mean
-        suspect = (*of_source(state.rejected, now.measurement)[2 - REMEMBERED :], now)
-        seen_anew = (r._replace(residual=r.residual - r.H @ moved) for r in suspect)
-        return FilterState(belief, state.outliers, (*rest, *seen_anew), now.innovation, accepted)
 
     def _weighed(
         self, state: FilterState, measurement: Measurement, model: MeasurementModel, mixture: Outliers
@@ -173,6 +156,26 @@ class ModelFilter:
         verdict = (measurement, OUTLIER if wrong else "", update.innovation.nis)
         outliers, verdicts = state.outliers + wrong, (*state.verdicts, verdict)
         return FilterState(update.belief, outliers, state.rejected, update.innovation, verdicts)
+
+
+def _recovered(
+    recovery: Recovery,
+    state: FilterState,
+    earlier: Rejected,
+    now: Rejected,
+    model: MeasurementModel,
+    rest: tuple[Rejected, ...],
+    accepted: Verdicts,
+    confirmed: int,
+) -> FilterState:
+    belief = recovery.recover(state.belief, earlier, now, model)
+    if recovery.fuses_both:
+        return FilterState(belief, state.outliers - confirmed, rest, now.innovation, (*accepted, earlier.taken))
+    # What is remembered of the source is from now on seen from the belief that has followed it.
+    moved = belief.mean - state.belief.mean
+    suspect = (*of_source(state.rejected, now.measurement)[2 - REMEMBERED :], now)
+    seen_anew = (r._replace(residual=r.residual - r.H @ moved) for r in suspect)
+    return FilterState(belief, state.outliers, (*rest, *seen_anew), now.innovation, accepted)
 
 
 def of_source(rejected: tuple[Rejected, ...], m: Measurement) -> tuple[Rejected, ...]:

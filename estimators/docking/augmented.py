@@ -3,6 +3,7 @@
 from typing import Literal, Unpack
 
 from estimators.core.filter import FilterState, ModelFilter
+from estimators.core.recovery import Readmission
 from estimators.docking.models import USBL, DockingNoise, ModelOptions, PlanarModels
 from estimators.docking.recovery import FixRecovery
 from estimators.planar.model import PlanarParameters
@@ -54,6 +55,8 @@ class AugmentedFilter(ModelFilter):
         self.noise = noise or DockingNoise()
         self.models = models = PlanarModels(parameters, self.noise, **options)
         recovery = FixRecovery(self.noise)
+        aided = {key if isinstance(key, str) else key[0] for key in models.aids}
         super().__init__(
-            models.process, models.sensors, models.start, gates={USBL: gate}, recovery=recovery, transform=transform
-        )
+            models.process, models.sensors, models.start, gates={USBL: gate, **dict.fromkeys(aided, gate)},
+            recovery=recovery, recoveries=dict.fromkeys(aided, Readmission()), transform=transform,
+        )  # fmt: skip

@@ -15,9 +15,10 @@ import numpy as np
 from estimators.core import smoothing
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
-from estimators.core.history import Filter, History, Node
+from estimators.core.estimator import StateFilter
+from estimators.core.history import History, Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement, Outcome, ProcessModel
+from estimators.core.types import Array, Gaussian, Measurement, Outcome
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.interacting import InteractingFilter
 from estimators.docking.models import (
@@ -70,17 +71,13 @@ class DockingEstimate:
     outcomes: tuple[Outcome, ...] = ()
 
 
-class DockingFilter(Filter[Any], Protocol):
+class DockingFilter(StateFilter, Protocol):
     """A filter for a `DockingEstimator`.
 
     Its states have `belief` (eight states and biases), `outliers`, `innovation` and `verdicts`, see `History`.
     """
 
     noise: DockingNoise
-
-    def process_after(self, state: Any) -> ProcessModel:
-        """The process by which it went on from a state, for `smoothing`; ParameterError if there is none that fits."""
-        ...
 
 
 class DockingEstimator:
@@ -104,7 +101,7 @@ class DockingEstimator:
         keep: float = 30.0,
         compensate_delay: bool = True,
     ) -> None:
-        self._filter = filter
+        self.filter = filter
         self._usbl = usbl or UsblModel()
         self._step, self._keep = step, keep
         self._compensate_delay = compensate_delay
@@ -114,7 +111,7 @@ class DockingEstimator:
     def reset(self) -> None:
         """Forgets everything, counts included."""
         self._history: History[Any] = History(
-            self._filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
+            self.filter, step=self._step, keep=self._keep, verdicts=attrgetter("verdicts")
         )
         self._restarts = 0  # of the filter
         self._outliers_before = self._outliers = 0  # rejected before its last start, and in all
@@ -126,7 +123,7 @@ class DockingEstimator:
             ParameterError: The filter cannot be smoothed: its covariance does not hold the error of the current.
         """
         nodes = self._history.nodes
-        beliefs = smoothing.smooth(nodes, self._filter.process_after)
+        beliefs = smoothing.smooth(nodes, self.filter.process_after)
         return [(node.time, belief) for node, belief in zip(nodes[len(nodes) - len(beliefs) :], beliefs, strict=True)]
 
     @property
@@ -135,7 +132,13 @@ class DockingEstimator:
         return self._history.nodes
 
     def tick(
-        self, time: float, heading: float | None, rudder: float, shaft_speed: float, fixes: Sequence[UsblFix] = ()
+        self,
+        time: float,
+        heading: float | None,
+        rudder: float,
+        shaft_speed: float,
+        fixes: Sequence[UsblFix] = (),
+        aids: Sequence[Measurement] = (),
     ) -> DockingEstimate:
         """One step of the filter.
 
@@ -145,6 +148,7 @@ class DockingEstimator:
             rudder: Mean rudder angle since the last tick [rad], positive to starboard.
             shaft_speed: Mean shaft speed since the last tick [rad/s].
             fixes: Packets that arrived since the last tick, in any order.
+            aids: What other sensors measured since then, see `aids.Aids`.
 
         Raises:
             ParameterError: The time does not advance, or an input is not a number.
@@ -164,7 +168,7 @@ class DockingEstimator:
             prompt += [replace(m, stamp=time) for m in measurements]
             measurements = []
         history.append(float(time), u, prompt)
-        for measurement in measurements:
+        for measurement in (*aids, *measurements):
             history.insert(measurement)
         return self._estimate(time, history.replay())
 

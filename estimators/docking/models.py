@@ -11,9 +11,12 @@ from estimators.core.errors import ParameterError
 from estimators.core.history import Node
 from estimators.core.loops import wrap
 from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
+from estimators.docking import range_start
+from estimators.docking.aids import RANGE, Aids
 from estimators.planar.model import BIASES, MAX_SUBSTEP, Biases, Integrator, PlanarParameters, PlanarProcess
 
 COMPASS, USBL = "compass", "usbl"  # kinds of measurement
+AIDED = ("gyro", "dvl_surge", "dvl_sway", "range_")  # how the errors of `aids` are called
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,14 +49,15 @@ class DockingNoise:
     biases: Mapping[str, Bias] = field(default_factory=dict)  # estimated besides, by the names of BIASES
 
     def __post_init__(self) -> None:
-        unknown = [name for name in self.biases if name not in BIASES]
+        unknown = [name for name in self.biases if name not in BIASES and not name.startswith(AIDED)]
         if unknown:
-            raise ParameterError(f"no bias {', '.join(unknown)}; there are {', '.join(BIASES)}")
+            raise ParameterError(f"no bias {', '.join(unknown)}; there are {', '.join((*BIASES, *AIDED))}")
 
     @property
     def bias_names(self) -> Biases:
-        """The biases in the state, in their order there."""
-        return tuple(name for name in BIASES if name in self.biases)
+        """The biases in the state, in their order there: those of BIASES, then those of `aids`."""
+        first = [name for name in BIASES if name in self.biases]
+        return (*first, *(name for name in self.biases if name not in BIASES))
 
     def densities(self) -> Array:
         """Power spectral densities (8,) in the order of the state, then one of each bias."""
@@ -170,6 +174,7 @@ class ModelOptions(TypedDict, total=False):
 
     transponder: tuple[float, float]
     initial_surge: float | None
+    aids: Aids
     integrator: Integrator
     max_substep: float
 
@@ -182,6 +187,7 @@ class PlanarModels:
         noise: Noise that the filter assumes, and the biases in its state.
         transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
         initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
+        aids: Sensors besides.
         integrator: "midpoint" or "euler".
         max_substep: Longest substep of the prediction [s].
     """
@@ -193,6 +199,7 @@ class PlanarModels:
         *,
         transponder: tuple[float, float] = (0.0, 0.0),
         initial_surge: float | None = None,
+        aids: Aids = Aids(),  # noqa: B008 - immutable
         integrator: Integrator = "midpoint",
         max_substep: float = MAX_SUBSTEP,
     ) -> None:
@@ -202,6 +209,7 @@ class PlanarModels:
         self.process = self.process_with(noise)
         places = {name: 8 + k for k, name in enumerate(noise.bias_names)}
         n = 8 + len(places)
+        self.aids = aids.models(noise.bias_names)
         self.heading = HeadingModel(n, places.get("compass"))
         self.position = PositionModel(
             transponder, n, dock_heading=places.get("dock_heading"), clock=places.get("clock")
@@ -214,15 +222,22 @@ class PlanarModels:
     @property
     def sensors(self) -> dict[str | tuple[str, str], MeasurementModel]:
         """The measurement models by kind."""
-        return {COMPASS: self.heading, USBL: self.position}
+        return {COMPASS: self.heading, USBL: self.position, **self.aids}
 
     def start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
-        """`first`, and the measurements that are in it: the fix and the compass, not further fixes."""
+        """`first`, and the measurements that are in it: the fix and the compass, not further fixes.
+
+        Without a fix, where ranges are heard: the place that those up to the node explain.
+        """
         found = self.first(nodes, index)
-        if found is None:
+        if found is not None:
+            belief, fix = found
+            return belief, [m for m in nodes[index].measurements if m is fix or m.kind == COMPASS]
+        now = [m for m in nodes[index].measurements if m.kind in (COMPASS, RANGE)]
+        if not any(m.kind == RANGE for m in now):
             return None
-        belief, fix = found
-        return belief, [m for m in nodes[index].measurements if m is fix or m.kind != USBL]
+        belief = self._by_ranges(nodes, index)
+        return None if belief is None else (belief, now)
 
     def first(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, Measurement] | None:
         """Belief at the node of a first fix, and that fix; None without a fix there or any compass sample.
@@ -234,26 +249,54 @@ class PlanarModels:
         heading = None if fix is None else _heading_at(nodes, index)
         if fix is None or heading is None:
             return None
-        noise, names = self.noise, self.noise.bias_names
+        mean = self._mean(heading, nodes[index])
+        mean[:2] = fix.value - self.position.evaluate(mean)
+        # The fix is given, so that the position takes the errors of all other states in it.
+        onto = np.eye(mean.size)
+        onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
+        return self._belief(mean, fix.covariance, onto), fix
+
+    def _by_ranges(self, nodes: Sequence[Node], index: int) -> Gaussian | None:
+        """Belief by the ranges so far; None where they leave the place open."""
+        heading = _heading_at(nodes, index)
+        if heading is None:
+            return None
+        mean = self._mean(heading, nodes[index])
+        velocity = mean[3] * np.array((math.cos(heading), math.sin(heading)))
+        ranges = range_start.heard(nodes[: index + 1], velocity, RANGE)
+        found = range_start.place(ranges, max(self.noise.initial_current, 1e-3))
+        if found is None:
+            return None
+        mean[:2] = found.position
+        # What a range shows too much has moved the place.
+        onto, names = np.eye(mean.size), self.noise.bias_names
+        for column, one in zip(found.gain.T, ranges, strict=True):
+            for name, factor in ((f"range_{one.source}", 1.0), (f"range_scale_{one.source}", one.value)):
+                if name in names:
+                    onto[:2, 8 + names.index(name)] -= factor * column
+        return self._belief(mean, found.covariance, onto)
+
+    def _mean(self, heading: float, node: Node) -> Array:
+        """The state at a start with its place still open."""
         surge = self._initial_surge
         if surge is None:
-            surge = steady_surge(self.parameters, nodes[index].input[1])
-        mean = np.array([0.0, 0.0, heading, surge, 0.0, 0.0, 0.0, 0.0, *(0.0 for _ in names)])
-        mean[:2] = fix.value - self.position.evaluate(mean)
+            surge = steady_surge(self.parameters, node.input[1])
+        return np.array([0.0, 0.0, heading, surge, 0.0, 0.0, 0.0, 0.0, *(0.0 for _ in self.noise.bias_names)])
+
+    def _belief(self, mean: Array, place: Array, onto: Array) -> Gaussian:
+        """What is known of a state whose place has a covariance (2, 2), and takes on other errors by `onto` (n, n)."""
+        noise, names = self.noise, self.noise.bias_names
         deviations = (noise.compass, noise.initial_surge, noise.initial_sway, noise.initial_yaw_rate)
         currents = (noise.initial_current, noise.initial_current)
         biases = [noise.biases[name].deviation for name in names]
         covariance = np.diag(np.square([0.0, 0.0, *deviations, *currents, *biases]))
-        covariance[:2, :2] = fix.covariance
+        covariance[:2, :2] = place
         # A compass bias is an error of the initial heading.
         J = np.eye(mean.size)
         if "compass" in names:
             J[2, 8 + names.index("compass")] = -1.0
-        # The fix is given, so that the position takes the errors of all other states in it.
-        onto = np.eye(mean.size)
-        onto[:2, 2:] = -self.position.jacobian(mean)[:, 2:]
         J = onto @ J
-        return Gaussian(mean=mean, covariance=J @ covariance @ J.T), fix
+        return Gaussian(mean=mean, covariance=J @ covariance @ J.T)
 
 
 def _heading_at(nodes: Sequence[Node], index: int) -> float | None:

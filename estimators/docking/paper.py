@@ -79,6 +79,7 @@ class PaperFilter:
         self.noise = replace(noise, current=0.0, initial_current=0.0, biases={})
         self._weights = None if weights is None else np.array(weights)
         self.models = PlanarModels(parameters, self.noise, **options)
+        self.sensors = self.models.sensors
 
     def start(self, nodes: Sequence[Node[PaperState]], index: int) -> PaperState | None:
         """State at the first fix, with no current; a second fix at the same node is fused."""

@@ -27,7 +27,7 @@ Integrator = Literal["euler", "midpoint"]
 # surge: acceleration that the model lacks, by an error of thrust or drag [m/s^2]; compass: bias of the vehicle's
 # compass [rad]; dock_heading: bias of the dock's compass [rad]; clock: time from a fix's stamp to its true time [s].
 BIASES = ("surge", "compass", "dock_heading", "clock")
-Biases = tuple[str, ...]  # a selection, in the order of BIASES
+Biases = tuple[str, ...]  # a selection, in the order of BIASES; then errors of other sensors, which only stand there
 
 # Velocities beyond these come from outliers, not from the vehicle's motion; the quadratic damping there would make
 # explicit steps of up to MAX_SUBSTEP unstable, so the accelerations are those at the limit.
@@ -145,8 +145,9 @@ def step_function(*, current: bool = True, integrator: Integrator = "midpoint", 
     """One step (x, u, p, h) -> (x', F = dx'/dx) of six states, of eight (with `current`), or of more with `biases`."""
     if integrator not in ("euler", "midpoint"):
         raise ParameterError(f"no integrator '{integrator}'; there are euler, midpoint")
-    if biases != tuple(name for name in BIASES if name in biases) or (biases and not current):
-        raise ParameterError(f"biases {biases} must be some of {BIASES}, in that order, behind a current")
+    first = tuple(name for name in BIASES if name in biases)
+    if biases[: len(first)] != first or (biases and not current):
+        raise ParameterError(f"biases {biases} must be some of {BIASES}, in that order, then others, behind a current")
     x, u = ca.SX.sym("x", 8 + len(biases) if current else 6), ca.SX.sym("u", 2)
     p, h = ca.SX.sym("p", len(PARAMETER_NAMES)), ca.SX.sym("h")
     slope = derivative(x, u, p, biases)

@@ -25,6 +25,7 @@ from auvsim.physics import planar_fit
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
+from estimators.core.types import Measurement
 from estimators.docking.estimator import UsblFix
 from estimators.docking.models import DockingNoise
 
@@ -70,7 +71,13 @@ class Recorder:
         self.resets += 1
 
     def tick(
-        self, time: float, heading: float | None, rudder: float, shaft_speed: float, fixes: Sequence[UsblFix]
+        self,
+        time: float,
+        heading: float | None,
+        rudder: float,
+        shaft_speed: float,
+        fixes: Sequence[UsblFix],
+        aids: Sequence[Measurement],
     ) -> SimpleNamespace:
         """Keeps its arguments."""
         self.ticks.append(SimpleNamespace(time=time, heading=heading, rudder=rudder, shaft=shaft_speed, fixes=fixes))

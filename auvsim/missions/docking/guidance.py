@@ -146,6 +146,9 @@ class Docking(Mission):
         self.axis = 0.0  # course of the dock's axis [rad], the mean of what the dock reported
         self._axis_sum = (0.0, 0.0)
         self._depth_sum, self._fixes = 0.0, 0
+        self._ranges = setup.ranges
+        if not setup.usbl:  # the dock lies as it is charted
+            self.axis, self._depth_sum, self._fixes = self.dock.pose.heading, self.dock.pose.depth, 1
         self._last_fix = 0.0
         self._certain = 0.0  # when the position across the axis was last known better than the mouth's radius
         self._hold: tuple[float, float] | None = None  # heading and depth held in search
@@ -187,6 +190,8 @@ class Docking(Mission):
     def _observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's reports among `readings`."""
         for reading in readings:
+            if reading.sensor in self._ranges:
+                self._last_fix = max(self._last_fix, reading.received)
             if reading.sensor == "usbl" and all(map(math.isfinite, reading.value.tolist())):
                 heading, depth = float(reading.value[3]), float(reading.value[6])
                 self._axis_sum = (self._axis_sum[0] + math.cos(heading), self._axis_sum[1] + math.sin(heading))

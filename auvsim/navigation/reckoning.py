@@ -1,0 +1,156 @@
+"""Dead reckoning by DVL, gyro and compass, corrected by fixes and ranges: for vehicles of which no model is known."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base.alpha_beta import AlphaBeta
+from auvsim.base.reading import Reading
+from auvsim.navigation.docking import DEPTH_GAINS
+from auvsim.navigation.estimate import Estimate
+from auvsim.navigation.measurements import FIX, FixSettings, measurements, of_kind
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.range import RangeSettings
+from estimators.core.estimator import Estimator
+from estimators.core.filter import ModelFilter
+from estimators.core.history import Node
+from estimators.core.models import sensors
+from estimators.core.models.motion import constant_velocity, with_error
+from estimators.core.models.process import MotionProcess
+from estimators.core.types import Gaussian, Measurement
+from estimators.docking.aids import BOTTOM, GYRO, RANGE
+from estimators.docking.models import COMPASS
+from estimators.docking.usbl import UsblFix, UsblModel
+
+BIASES = {"compass_bias": "rad", "gyro_bias": "rad/s"}
+SPEED, TURNING = 1.0, 0.1  # what is not known at first: velocities [m/s], yaw rate [rad/s]
+GYRO_BIAS, UNKNOWN = 1e-3, 50.0  # deviations at the start: of a gyro's bias [rad/s], of a position by ranges alone [m]
+
+
+class ReckoningNavigator:
+    """A filter of position, heading, velocity over ground and yaw rate, all of which only measurements tell.
+
+    Velocities are random walks, so that a DVL that is away for a while costs no more than it must. Without anything
+    that fixes the position it starts at the datum.
+    """
+
+    def __init__(self, setup: NavigatorSetup) -> None:
+        s = setup.settings
+        motion = constant_velocity(turning=True)
+        for name, unit in BIASES.items():
+            motion = with_error(motion, name, unit)
+        self.states: Mapping[str, str] = dict(motion.space.units)
+        self._space, self._sensors = motion.space, dict(setup.sensors)
+        self._compass_bias = math.radians(s.compass_error_deg)
+        self._located = (setup.dock is not None and setup.usbl.enabled) or bool(of_kind(self._sensors, FixSettings))
+        self._ranged = bool(of_kind(self._sensors, RangeSettings))
+        self._dock = np.zeros(2) if setup.dock is None else setup.dock.position[:2]
+        self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))
+        process = MotionProcess(
+            motion,
+            {"surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12},
+        )
+        models = {
+            COMPASS: sensors.compass(motion, bias="compass_bias"),
+            GYRO: sensors.gyro(motion, bias="gyro_bias"),
+            BOTTOM: sensors.dvl(motion),
+            FIX: sensors.fix(motion),
+            RANGE: sensors.range_to(motion),
+        }
+        filter_ = ModelFilter(process, models, self._start, gates=0.9999)
+        self._estimator = Estimator(filter_, step=setup.period)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._estimator.reset()
+        self._depth = AlphaBeta(*DEPTH_GAINS)
+        self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """See `Buffered`."""
+        return self._estimator.nodes
+
+    @property
+    def filter(self) -> ModelFilter:
+        """See `Buffered`."""
+        return self._estimator.filter  # pyright: ignore[reportReturnType]
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """See `Buffered`."""
+        return self._estimator.smoothed()
+
+    def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
+        """See `Navigator.update`."""
+        found: list[Measurement] = []
+        for reading in readings:
+            if reading.sensor == "compass":
+                self._tilt = (float(reading.value[1]), float(reading.value[2]))
+            if reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+            elif reading.sensor == "usbl":
+                found.append(self._fix(reading))
+            elif reading.sensor in self._sensors:
+                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
+        result = self._estimator.tick(time, (), found)
+        n = len(self._space)
+        belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
+        mean = belief.mean
+        return Estimate(
+            time=time,
+            position=np.array((mean[0], mean[1], self._depth.at(time) or 0.0)),
+            heading=float(mean[2]),
+            velocity=mean[3:6],
+            current=np.zeros(2),
+            covariance=belief.covariance,
+            initialised=result.belief is not None,
+            mean=mean,
+            refused=sum(result.refused.values()),
+            reasons=result.refused,
+            reinitialised=result.reinitialised,
+            outcomes=result.outcomes,
+        )
+
+    def _fix(self, reading: Reading) -> Measurement:
+        """A dock's packet as a position from the datum."""
+        x, y, z, heading, pitch, roll, _ = reading.value.tolist()
+        fix = self._usbl.world_fix(
+            UsblFix(stamp=reading.stamp, received=reading.received, sequence=reading.sequence, position=(x, y, z),
+                    heading=heading, pitch=pitch, roll=roll)
+        )  # fmt: skip
+        return Measurement(
+            kind=FIX, value=fix.value + self._dock, covariance=fix.covariance, stamp=fix.stamp, received=fix.received,
+            sequence=fix.sequence,
+        )  # fmt: skip
+
+    def _start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+        """At the first node with a fix and a compass at or before it; at the first compass, where nothing locates."""
+        node = nodes[index]
+        earlier = [m for other in nodes[: index + 1] for m in other.measurements if m.kind == COMPASS]
+        fix = next((m for m in node.measurements if m.kind == FIX), None)
+        if not earlier or (self._located and fix is None):
+            return None
+        deviation = UNKNOWN if self._ranged else 0.0
+        known = {
+            "heading": math.hypot(self._compass_bias, math.sqrt(earlier[-1].covariance.item())),
+            "surge": SPEED, "sway": SPEED, "yaw_rate": TURNING, "compass_bias": self._compass_bias,
+            "gyro_bias": GYRO_BIAS, "north": deviation, "east": deviation,
+        }  # fmt: skip
+        belief = self._space.belief({"heading": float(earlier[-1].value[0])}, known)
+        mean, covariance = belief.mean, belief.covariance
+        psi, bias = self._space.index("heading"), self._space.index("compass_bias")
+        covariance[psi, bias] = covariance[bias, psi] = -(
+            self._compass_bias**2
+        )  # it shows too much: so does the heading
+        if fix is not None:
+            mean[:2], covariance[:2, :2] = fix.value, fix.covariance
+        return belief, [m for m in node.measurements if m is fix or m is earlier[-1]]
+
+
+def dead_reckoning(setup: NavigatorSetup) -> Navigator:
+    """Dead reckoning by DVL, gyro and compass with fixes and ranges, on no vehicle's model."""
+    return ReckoningNavigator(setup)

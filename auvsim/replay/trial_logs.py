@@ -1,0 +1,97 @@
+"""Trial logs as recordings: readings, packets and commands as the loop handed them to the estimator."""
+
+import math
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from auvsim.acoustics.message import Delivery, Message, UsblPacket
+from auvsim.base.errors import InputError
+from auvsim.base.randomness import Noise, stream
+from auvsim.base.reading import Reading
+from auvsim.data.log import VehicleLog, read
+from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.replay.recording import DELIVERED, Arrival, Recording
+from auvsim.simulation import scenario
+from auvsim.simulation.scenario import Scenario
+from auvsim.simulation.setups import model_speed, navigator_setup
+from auvsim.vehicles import library
+
+
+def recordings(path: Path) -> list[Recording]:
+    """What the estimator of each vehicle of a log was given.
+
+    Raises:
+        InputError: It is no whole log, or no estimator ran in it.
+    """
+    log = read(path)
+    plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
+    return [_recording(log.vehicle(name), plan, path) for name in log.vehicles]
+
+
+def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
+    settings = plan.vehicles[log.name]
+    vehicle = library.vehicle(settings.model)
+    times = log["estimate"]["time"]
+    if not len(times):
+        raise InputError(f"{path}: no estimate of '{log.name}' in it; an estimator is replayed at the times it ran")
+    speed = model_speed(settings.estimator)
+    shaft_speed = fit_planar_model(settings.model, speed, plan.water.density).shaft_speed_for(settings.start.speed)
+    before = vehicle.actuation.at_speed(shaft_speed)
+    command = log["command"]
+    demands = zip(*(command[demand.name].tolist() for demand in vehicle.actuation.demands), strict=True)
+    commands = [before, *(type(before)(*values) for values in demands)]
+    # An update comes before the command of its own time.
+    in_force = np.searchsorted(command["time"], times, side="left")
+    sensors = [group for group in log.groups if group.startswith("sensors/")]
+    clock = [log[group]["time"] for group in ("truth", "command", *sensors) if group != "sensors/usbl"]
+    return Recording(
+        name=path.stem if len(log.log.vehicles) == 1 else f"{path.stem}, {log.name}",
+        times=times,
+        clock=np.unique(np.concatenate([times, *clock])),
+        commands=[commands[k] for k in in_force.tolist()],
+        arrivals=[a for rank, group in enumerate(sensors) for a in _arrivals(log, group, rank, plan)],
+        setup=lambda other: navigator_setup(plan, log.name, vehicle, other),
+        own=settings.estimator,
+        vehicle=log,
+    )
+
+
+def _arrivals(log: VehicleLog, group: str, rank: int, plan: Scenario) -> Iterator[Arrival]:
+    """The readings of a sensor that arrived; of a packet that came twice, both."""
+    name, columns = group.removeprefix("sensors/"), log[group]
+    rows = zip(columns["time"].tolist(), columns["received"].tolist(), columns["sequence"].tolist(), strict=True)
+    copies = _copies(log, plan) if name == "usbl" else {}
+    for (stamp, received, sequence), value in zip(rows, columns["value"], strict=True):
+        reading = Reading(name, stamp, received, value, sequence)
+        if math.isnan(received):
+            continue
+        if name != "usbl":
+            yield Arrival(reading, rank)
+            continue
+        yield _delivered(log, reading)
+        if sequence in copies:
+            yield _delivered(log, reading._replace(received=received + copies[sequence]))
+
+
+def _delivered(log: VehicleLog, reading: Reading) -> Arrival:
+    source = str(log.attributes.get("usbl_structure") or log.attributes.get("dock", ""))
+    packet = UsblPacket(reading._replace(received=math.nan), None)
+    message = Message(source, log.name, reading.stamp, reading.sensor, packet)
+    return Arrival(reading, DELIVERED, Delivery(message, reading.received))
+
+
+def _copies(log: VehicleLog, plan: Scenario) -> dict[int, float]:
+    """How much later a second copy of each packet came [s]; a log has the first only, but its seed says the rest."""
+    acoustics = plan.network.acoustics
+    if acoustics.duplicate_probability == 0.0:
+        return {}
+    attributes = log.log.attributes
+    noise = Noise(stream(int(attributes["seed"]), int(attributes["trial"]), f"{log.name}/acoustics"))
+    later = {}
+    for sequence in log["sensors/usbl"]["sequence"].tolist():
+        *_, twice, gap = noise.uniforms(5)
+        if twice < acoustics.duplicate_probability:
+            later[sequence] = gap * acoustics.late_delay
+    return later
