@@ -18,7 +18,8 @@ from auvsim.base.frames import rotation
 from auvsim.physics import scenery, scenes
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.world import World
-from auvsim.simulation.run import Simulation, current
+from auvsim.simulation.building import current
+from auvsim.simulation.run import Simulation
 from auvsim.simulation.scenario import Scenario
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands

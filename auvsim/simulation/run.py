@@ -1,10 +1,9 @@
 """The one closed loop: the world moves; every agent senses, navigates and acts; all of it is logged."""
 
-import hashlib
 import math
 import os
 import time as wall
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,25 +12,20 @@ from numpy.random import Generator
 from auvsim.acoustics.link import Channel
 from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
-from auvsim.base import yaml_text
 from auvsim.base.errors import DivergenceError
 from auvsim.base.frames import Array
 from auvsim.base.randomness import stream
-from auvsim.base.reading import Reading
 from auvsim.data.log import Log
-from auvsim.data.recorder import Recorder
-from auvsim.data.variables import run_groups
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics import scenes, soundness
 from auvsim.physics.truth import Truth
-from auvsim.physics.world import World
 from auvsim.simulation.agent import Agent
+from auvsim.simulation.building import build_world, check_steps, current, structure_model, vehicle_model
 from auvsim.simulation.parts import PartError
-from auvsim.simulation.scenario import Scenario, to_yaml
+from auvsim.simulation.recording import Unrecorded, recorder
+from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.stretches import Stretches
-from auvsim.vehicles import library
-from auvsim.water.currents import CurrentField, build_current, listeners
+from auvsim.water.currents import listeners
 
 
 class ProgressState(NamedTuple):
@@ -130,12 +124,12 @@ class Simulation:
 
         self.world = world or build_world(scenario, current(scenario, seed, trial))
         self._places = {
-            name: Place(name=name, pose=settings.pose, structure=_structure(self.world, name, settings.model))
+            name: Place(name=name, pose=settings.pose, structure=structure_model(self.world, name, settings.model))
             for name, settings in scenario.structures.items()
         }
         self.agents = [
             agents(
-                name, scenario, _vehicle(self.world, name, settings.model), self._places, noise(name),
+                name, scenario, vehicle_model(self.world, name, settings.model), self._places, noise(name),
                 navigator=(navigators or {}).get(name), mission=(missions or {}).get(name),
             )
             for name, settings in scenario.vehicles.items()
@@ -156,8 +150,9 @@ class Simulation:
             start = settings.start
             place = np.array(scenario.start_position(name))
             self.place(name, place, math.radians(start.heading_deg), start.speed)
-        self.log = self._recorder(seed, trial, path) if record else Unrecorded()
-        self._record_models()
+        self.log: Any = Unrecorded()
+        if record:
+            self.log = recorder(scenario, self.agents, self._places, self._usbl, seed=seed, trial=trial, path=path)
         self._record_truths()
 
     @property
@@ -255,14 +250,6 @@ class Simulation:
                 impulse += contact.force * tick
                 self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
 
-    def _record_models(self) -> None:
-        """Writes down the text of every model, since its file may change or be elsewhere when the log is read."""
-        texts = {("vehicle", self.scenario.vehicles[a.name].model): a.vehicle.source for a in self.agents}
-        for name, place in self._places.items():
-            texts["structure", self.scenario.structures[name].model] = place.structure.source
-        for (kind, model), text in texts.items():
-            self.log.append("models", (0.0, kind, model, hashlib.sha256(text.encode()).hexdigest(), text))
-
     def _record_truths(self) -> None:
         for name, truth in self.truths.items():
             self.log.truth(name, truth)
@@ -291,106 +278,3 @@ class Simulation:
             clock_offset=self.scenario.network.acoustics.clock_offset,
             occupant=lambda: state.latched if state else None,
         )
-
-    def _recorder(self, seed: int, trial: int, path: str | os.PathLike[str] | None) -> Recorder:
-        scenario = self.scenario
-        served = {usbl.vehicle: ({"value": usbl.value, **usbl.columns}, usbl.sizes) for usbl in self._usbl}
-        groups = run_groups({agent.name: agent.groups(served.get(agent.name)) for agent in self.agents})
-        attributes: dict[str, Any] = {"scenario": to_yaml(scenario), "seed": seed, "trial": trial}
-        if scenario.datum.latitude is not None and scenario.datum.longitude is not None:
-            attributes |= {"latitude": scenario.datum.latitude, "longitude": scenario.datum.longitude}
-        of_groups = {f"vehicles/{agent.name}": self._attributes_of(agent) for agent in self.agents}
-        of_groups |= {f"structures/{name}": self._attributes_of_structure(name) for name in scenario.structures}
-        return Recorder(groups, attributes, of_groups, path)
-
-    def _attributes_of(self, agent: Agent) -> dict[str, Any]:
-        """Attributes of a vehicle in the log."""
-        settings = self.scenario.vehicles[agent.name]
-        return {
-            "model": settings.model,
-            "nose": agent.vehicle.nose,
-            "length": agent.vehicle.length,
-            "estimator": settings.estimator.kind,
-            "controller": settings.control.kind,
-            "mission": settings.mission.kind,
-            "mission_settings": yaml_text.dump(settings.mission.model_dump(mode="json")),
-            "dock": agent.mission.dock.name if agent.mission.dock else "",
-            "usbl_structure": (agent.dock if agent.serves else None) or "",
-        }
-
-    def _attributes_of_structure(self, name: str) -> dict[str, Any]:
-        """Attributes of a structure in the log; its transceiver is that of the first vehicle that it serves."""
-        settings = self.scenario.structures[name]
-        place = {"north": settings.north, "east": settings.east, "depth": settings.depth}
-        served = next((agent.name for agent in self.agents if agent.serves and agent.dock == name), None)
-        transceiver = self.scenario.vehicles[served].sensors.usbl.transceiver if served else ()
-        axes = ("transceiver_forward", "transceiver_starboard", "transceiver_down")
-        return {
-            "model": settings.model,
-            **place,
-            "heading": settings.pose.heading,
-            **self._places[name].structure.dimensions,
-            **dict(zip(axes, transceiver, strict=False)),
-        }
-
-
-class Unrecorded:
-    """Takes the place of a recorder where nothing is to be kept."""
-
-    def append(self, group: str, row: Sequence[Any]) -> None:
-        """Keeps nothing."""
-
-    def truth(self, vehicle: str, truth: Truth) -> None:
-        """Keeps nothing."""
-
-    def reading(self, vehicle: str, reading: Reading, *extra: Any) -> None:
-        """Keeps nothing."""
-
-    def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
-        """Keeps nothing."""
-
-
-def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
-    """The current of a run; its draws are from a stream of the only vehicle, or of the water."""
-    names = [*scenario.vehicles]
-    source = f"{names[0]}/current" if len(names) == 1 else "water/current"
-    return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
-
-
-def check_steps(scenario: Scenario) -> None:
-    """Sees that the physics step is short enough for every vehicle.
-
-    Raises:
-        InputError: it is too long; the text says which rate would do.
-    """
-    for model in {settings.model: None for settings in scenario.vehicles.values()}:
-        soundness.check_step(model, scenario.physics.integrator, scenario.rates.physics, scenario.water.density)
-
-
-def build_world(scenario: Scenario, current: CurrentField, **given: Any) -> World:
-    """MuJoCo's world of a scenario.
-
-    Args:
-        scenario: what is in it.
-        current: what the water does.
-        **given: see `World`.
-    """
-    scene = scenes.scene(
-        {name: settings.model for name, settings in scenario.vehicles.items()},
-        {name: (settings.model, settings.pose) for name, settings in scenario.structures.items()},
-        scenario.world,
-        scenario.rates.physics,
-        {name: settings.ballast for name, settings in scenario.vehicles.items()},
-    )
-    return World(scene, current, scenario.water.density, **given)
-
-
-def _vehicle(world: Any, name: str, model: str) -> library.Vehicle:
-    """The model of a vehicle, which the world has loaded already, or else is loaded."""
-    known = getattr(world, "models", {})
-    return known[name] if name in known else library.vehicle(model)
-
-
-def _structure(world: Any, name: str, model: str) -> library.Structure:
-    """The model of a structure, likewise."""
-    return world.structures[name].structure if name in world.structures else library.structure(model)

@@ -94,7 +94,7 @@ def test_arguments_of_other_commands(tmp_path, monkeypatch, capsys, arguments: s
 
 def test_a_gust_of_more_knots_than_memory_is_refused() -> None:
     """Within both bounds alone, not together: 10^6 s of 0.1 s would be 2 * 10^8 knots."""
-    from auvsim.simulation.run import current
+    from auvsim.simulation.building import current
 
     values = {"duration": 1e6, "current": {"kind": "gust", "correlation_time": 0.1}}
     with pytest.raises(InputError, match=r"give at least 10 s, or a shorter duration"):

@@ -28,8 +28,9 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.reproduce.paper1.runs import DENSITIES, TRUTH_STEP, Track, course_round, heading_for
 from auvsim.sensors.compass import Compass
+from auvsim.simulation.building import build_world
 from auvsim.simulation.planar_world import PlanarWorld, planar_state
-from auvsim.simulation.run import Simulation, build_world
+from auvsim.simulation.run import Simulation
 from auvsim.simulation.scenario import Rates, Scenario, StructureSettings, VehicleSettings
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
