@@ -46,7 +46,7 @@ def _of_its_own(log: VehicleLog) -> dict[str, Any]:
     """Metrics of a mission of the user's own; none where its class cannot be found here."""
     try:
         return find(log.mission).metrics(log)
-    except Exception:  # a user's class may be missing, or fail in any way
+    except (Exception, SystemExit):  # a user's class may be missing, or fail in any way
         return {}
 
 

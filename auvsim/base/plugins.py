@@ -43,8 +43,9 @@ def find(what: str, name: str, shipped: Mapping[str, Part]) -> Part | Any:
         sys.path.append(folder)
     try:
         return getattr(importlib.import_module(module), attribute)
-    except Exception as error:  # a user's module may fail in any way while it is imported
-        raise InputError(f"{what} '{name}': {type(error).__name__}: {error}") from None
+    except (Exception, SystemExit) as error:  # a user's module may fail in any way while it is imported
+        text = " ".join(str(error).split())[:300]
+        raise InputError(f"{what} '{name}': {type(error).__name__}: {text}") from None
 
 
 def require(what: str, made: Any, *names: str) -> None:

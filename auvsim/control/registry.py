@@ -38,7 +38,7 @@ def build(kind: str, setup: ControllerSetup) -> Controller:
         part = made(setup)
     except AuvsimError:
         raise
-    except Exception as error:  # a user's class may fail in any way
+    except (Exception, SystemExit) as error:  # a user's class may fail in any way
         raise InputError(f"controller '{kind}' cannot be made: {type(error).__name__}: {error}") from error
     plugins.require(f"controller '{kind}'", part, "observe", "command", "heading", "depth")
     return part

@@ -195,7 +195,7 @@ def _packed(rows: Sequence[Sequence[Any]], group: Group, path: str) -> dict[str,
         try:
             make = _concatenated if len(shape) > 1 else np.array
             columns[name] = make(values, dtype=variable.array_type).reshape(shape)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InputError(f"log: '{path}/{name}' should have shape {shape}: {error}") from None
     return columns
 

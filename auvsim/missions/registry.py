@@ -52,7 +52,7 @@ def build(kind: str, setup: MissionSetup) -> Mission:
         part = made(setup)
     except AuvsimError:
         raise
-    except Exception as error:  # a user's class may fail in any way
+    except (Exception, SystemExit) as error:  # a user's class may fail in any way
         raise InputError(f"mission '{kind}' cannot be made: {type(error).__name__}: {error}") from error
     plugins.require(f"mission '{kind}'", part, "phases", "phase", "variables", "finished", "events", "update", "row")
     return part

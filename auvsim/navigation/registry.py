@@ -44,7 +44,7 @@ def build(setup: NavigatorSetup) -> Navigator:
         navigator: Any = factory(setup)
     except AuvsimError:
         raise
-    except Exception as error:  # a user's factory may fail in any way
+    except (Exception, SystemExit) as error:  # a user's factory may fail in any way
         raise InputError(f"estimator '{kind}' cannot be made: {type(error).__name__}: {error}") from error
     plugins.require(f"estimator '{kind}'", navigator, "update", "reset", "states")
     states = navigator.states

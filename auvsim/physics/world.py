@@ -21,6 +21,7 @@ from auvsim.water.currents import CurrentField
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
 NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
+OVERLAP = 0.001  # depth from which two things that start are inside each other [m]
 LOOKOUT = 0.25  # longest time between two checks of these distances [s]
 
 
@@ -177,6 +178,18 @@ class World:
         self._unplaced.discard(vehicle)
         if not self._unplaced:
             mujoco.mj_forward(self.model, self.data)
+
+    def overlaps(self) -> list[tuple[str, str, float]]:
+        """Pairs of vehicles, structures and the sea floor that reach into each other, and how deep [m]."""
+        self._options.disableflags = self._near_flags
+        mujoco.mj_fwdPosition(self.model, self.data)
+        found = []
+        for contact in self.data.contact:
+            names = [self.model.body(self.model.geom_bodyid[geom]).name.partition("/")[0] for geom in contact.geom]
+            one, other = (SEA_FLOOR if name == "world" else name for name in names)
+            if one != other and contact.dist < -OVERLAP:
+                found.append((one, other, -float(contact.dist)))
+        return found
 
     def refresh_water(self, ahead: float = 0.0) -> None:
         """Expands the current anew round every vehicle.

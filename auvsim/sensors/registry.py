@@ -48,7 +48,7 @@ def build(kind: str, settings: Any, generator: Generator, *, name: str, vehicle:
         sensor = made(settings, generator, name=name, vehicle=vehicle)
     except AuvsimError:
         raise
-    except Exception as error:  # a user's class may fail in any way
+    except (Exception, SystemExit) as error:  # a user's class may fail in any way
         raise InputError(f"sensor '{name}' ({kind}) cannot be made: {type(error).__name__}: {error}") from error
     plugins.require(f"sensor '{name}' ({kind})", sensor, "name", "value", "sizes", "measure")
     if not isinstance(sensor.value, Variable):

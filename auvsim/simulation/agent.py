@@ -243,6 +243,7 @@ class Agent:
         log.append(self._decisions, (time, mission.phase, *wanted[:3], *row))
         log.append(self._commands, (time, *self.commands))
         self._warn(time, log)
+        self._running = self._mission
         for event in mission.events:
             log.event(event.time, self.name, event.kind, event.text)
         mission.events.clear()

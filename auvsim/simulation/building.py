@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from auvsim.base.errors import InputError
 from auvsim.base.randomness import stream
 from auvsim.physics import scenes, soundness
 from auvsim.physics.world import World
@@ -54,3 +55,15 @@ def vehicle_model(world: Any, name: str, model: str) -> library.Vehicle:
 def structure_model(world: Any, name: str, model: str) -> library.Structure:
     """The model of a structure, likewise."""
     return world.structures[name].structure if name in world.structures else library.structure(model)
+
+
+def refuse_overlaps(world: Any) -> None:
+    """Sees that nothing starts inside something else.
+
+    Raises:
+        InputError: two things overlap where they start.
+    """
+    for one, other, depth in world.overlaps() if hasattr(world, "overlaps") else ():
+        raise InputError(
+            f"start: '{one}' and '{other}' overlap by {depth:.2f} m; start them apart (vehicles.NAME.start, structures)"
+        )

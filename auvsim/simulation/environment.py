@@ -29,7 +29,7 @@ from auvsim.vehicles.library import Vehicle
 class CommandedAgent:
     """An agent without sensors, estimator and mission, which carries out commands from outside."""
 
-    dock, mission, over = None, None, False
+    dock, mission, over, serves = None, None, False, False
 
     def __init__(self, name: str, plan: Scenario, vehicle: Vehicle, *_: Any, **__: Any) -> None:
         start = plan.vehicles[name].start

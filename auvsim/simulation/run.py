@@ -14,13 +14,21 @@ from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
 from auvsim.base.errors import DivergenceError
 from auvsim.base.frames import Array
+from auvsim.base.interruption import HeldInterrupt
 from auvsim.base.randomness import stream
 from auvsim.data.log import Log
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
 from auvsim.physics.truth import Truth
 from auvsim.simulation.agent import Agent
-from auvsim.simulation.building import build_world, check_steps, current, structure_model, vehicle_model
+from auvsim.simulation.building import (
+    build_world,
+    check_steps,
+    current,
+    refuse_overlaps,
+    structure_model,
+    vehicle_model,
+)
 from auvsim.simulation.parts import PartError
 from auvsim.simulation.recording import Unrecorded, recorder
 from auvsim.simulation.scenario import Scenario
@@ -64,10 +72,11 @@ def run(
         check_steps(scenario)
     simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
     log: Any = simulation.log
-    with log:
+    with log, HeldInterrupt() as interrupt:
         try:
             last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
             while simulation.ticks < last and not simulation.over:
+                interrupt.check()
                 simulation.step()
                 if progress and simulation.ticks % simulation.progress_ticks == 0:
                     progress(simulation.progress())
@@ -150,6 +159,7 @@ class Simulation:
             start = settings.start
             place = np.array(scenario.start_position(name))
             self.place(name, place, math.radians(start.heading_deg), start.speed)
+        refuse_overlaps(self.world)
         self.log: Any = Unrecorded()
         if record:
             self.log = recorder(scenario, self.agents, self._places, self._usbl, seed=seed, trial=trial, path=path)

@@ -14,6 +14,7 @@ from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.feedback import FeedbackSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.registry import SENSORS
+from auvsim.vehicles.library import INSTANCE
 
 
 class OwnSensor(OwnPart):
@@ -48,6 +49,10 @@ class SensorSettings(Settings):
     def _others_are_sensors(self) -> "SensorSettings":
         extra = self.__pydantic_extra__ or {}
         for name, values in extra.items():
+            if not INSTANCE.fullmatch(name) or hasattr(type(self), name):
+                raise ValueError(
+                    f"{name[:80]!r}: a sensor's name is 1 to 64 letters, digits, '_' and '-', for example altimeter_2"
+                )
             if not isinstance(values, Settings):
                 extra[name] = _other(name, values)
         return self

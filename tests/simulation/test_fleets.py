@@ -157,3 +157,27 @@ def test_a_dock_that_is_not_named_where_there_are_two_is_refused() -> None:
     vehicle = {"start": {"north": 0.0, "east": 0.0}}
     with pytest.raises(InputError, match="no dock is given; name one of a, b"):
         Simulation(scenario.parse({"structures": two, "vehicles": {"auv": vehicle}}), 0)
+
+
+@pytest.mark.parametrize(
+    ("second", "pair"),
+    [
+        ({"north": 0.0, "east": 5.0, "depth": 20.0}, "'first' and 'second'"),  # where the first one is
+        ({"north": 0.9, "east": 5.05, "depth": 20.0}, "'first' and 'second'"),  # its stern in the other's bow
+        (
+            {"north": 90.0, "east": 5.7, "depth": 20.0},
+            "'second' and 'dock'|'dock' and 'second'",
+        ),  # in the funnel's wall
+        ({"north": -50.0, "east": 5.0, "depth": 39.95}, "'sea_floor' and 'second'"),
+    ],
+)
+def test_nothing_starts_inside_something_else(second: dict, pair: str) -> None:
+    plan = near(first=docking(0.0, 5.0), second={"start": {"heading_deg": 0.0, "speed": 1.5, **second}})
+    with pytest.raises(InputError, match=rf"start: ({pair}) overlap by 0\.\d\d m; start them apart"):
+        Simulation(plan, 0)
+
+
+def test_what_nearly_touches_starts() -> None:
+    """Two hulls of 0.095 m radius side by side, 0.2 m apart."""
+    near_each_other = near(first=docking(0.0, 5.0), second=docking(0.0, 5.35))
+    assert len(Simulation(near_each_other, 0).agents) == 2

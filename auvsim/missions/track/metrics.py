@@ -32,6 +32,8 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
         for leg in range(1, len(points)):
             part = (ahead == leg) & (truth["time"] >= first) & (truth["time"] <= last)
             begin, way = points[leg - 1], points[leg] - points[leg - 1]
+            if not way.any():
+                continue  # a waypoint given twice is no leg
             off = truth["position"][part, :2] - begin
             squares.append(((way[0] * off[:, 1] - way[1] * off[:, 0]) / math.hypot(*way)) ** 2)
     all_squares = np.concatenate(squares) if squares else np.empty(0)
