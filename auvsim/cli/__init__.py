@@ -85,7 +85,7 @@ class Manoeuvre:
 
 @dataclass(frozen=True, kw_only=True)
 class Video:
-    """Draws docking.mp4 beside a log, or one picture of it."""
+    """Draws a video beside a log, docking.mp4 of one vehicle and its dock, else run.mp4; or one picture of it."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
     """Log of a trial."""
@@ -101,7 +101,7 @@ class Video:
 
 @dataclass(frozen=True, kw_only=True)
 class Plot:
-    """Draws track.png and estimates.png beside a log."""
+    """Draws track.png and estimates.png beside a log; of a manoeuvre its own picture, of several vehicles fleet.png."""
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
     """Log of a trial."""
@@ -185,17 +185,18 @@ class Report:
 
 @dataclass(frozen=True, kw_only=True)
 class Identify:
-    """Fits the model of motion that predicts best to logs of manoeuvres, and judges it on what is held out.
+    """Fits models of motion to logs of manoeuvres, and judges them on what is held out.
 
-    Writes motion_model.yaml, report.html and report.png, and parameters.yaml, the planar model that --estimator.model
-    of `auvsim dock` takes, each only if it predicts better than none. With a vehicle (a trial log's own, or --vehicle)
-    the planar model starts from that vehicle's; else from nothing. A log is a trial's, or a CSV or NetCDF file with
+    Of a known vehicle (a trial log's own, or --vehicle) it fits the planar model, which starts from that vehicle's, and
+    writes parameters.yaml, which --estimator.model of `auvsim dock` takes, report.html and report.png. Of an unknown
+    one, or with --motion, it chooses the structure that predicts best and writes motion_model.yaml, if that predicts
+    better than a vehicle that goes on as it began. A log is a trial's, or a CSV or NetCDF file with
     named columns such as `time [s]`, `rudder [deg]`, `n [rpm]`, `heading [deg]`: rudder positive to starboard, heading
     clockwise from north.
     """
 
     logs: Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="LOG...")]
-    """Logs of manoeuvres, best two minutes or more of different kinds."""
+    """Logs of manoeuvres, of different kinds, best two minutes or more in all."""
     out: Path = Path("out")
     """Folder of parameters.yaml, report.html and report.png."""
     holdout: tuple[Path, ...] = ()
@@ -213,7 +214,7 @@ class Identify:
     mass: float | None = None
     """Mass of the vehicle [kg]."""
     quick: bool = False
-    """Fewer structures and steps on a coarser grid: some seconds."""
+    """Of a motion model fewer structures and steps, on a coarser grid: some seconds."""
     name: str | None = None
     """Also keep the parameters under this name, in models/<vehicle>/planar/."""
     motion: bool = False

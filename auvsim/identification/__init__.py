@@ -1,4 +1,4 @@
-"""Parameters of the planar model from records of manoeuvres."""
+"""Identification from records of manoeuvres: the planar model's parameters, and the structure of a motion model."""
 
 from auvsim.base.neighbours import check_estimators
 

@@ -1,1 +1,1 @@
-"""The papers' figures and tables, one file a paper."""
+"""The papers' figures and tables, one package per paper."""

@@ -54,7 +54,8 @@ def test_an_optimal_manoeuvre_is_designed_and_run(tmp_path: Path, capsys: pytest
     room = figures.numbers["room"]
     assert room is not None
     assert room < 63.0  # the planar model's turns are some per cent off
-    assert trial["event"]["text"].tolist() == ["optimal: approach", "optimal"]
+    told = [text for text in trial["event"]["text"].tolist() if "too old" not in text]  # before the first fix
+    assert told == ["optimal: approach", "optimal"]
 
 
 def test_a_file_pins_what_it_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -41,10 +41,15 @@ def run(case: Case, path: Path, *, shift: float = 0.0, duration: float | None = 
     """
     text = (HERE / case.file).read_text(encoding="utf-8")
     if shift:
-        text = START.sub(lambda m: f"{m[1]}{float(m[2]) + shift!r}{m[3]}{float(m[4]) + shift!r}", text, count=1)
+        text = START.sub(lambda m: f"{m[1]}{float(m[2]) + shift!r}{m[3]}{_turned(float(m[4]), shift)!r}", text, count=1)
     if duration is not None:
         text = re.sub(r"(?m)^duration: [0-9.]+", f"duration: {duration}", text)
     found = run_scenario(
         scenario.from_yaml(text, case.file), seed=case.seed, trial=case.trial, check_step=case.check_step
     )
     log.write(found, path)
+
+
+def _turned(heading: float, shift: float) -> float:
+    """A heading [deg] shifted; one of 0 stays where the shift is smaller than any number that a scenario may give."""
+    return heading + shift if heading or shift >= 1e-9 else heading

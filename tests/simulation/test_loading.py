@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 
+from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
 from auvsim.cli import options
 from auvsim.simulation.loading import SHIPPED, find, load_scenario
@@ -35,7 +36,8 @@ def test_shipped_scenario_says_all_there_is() -> None:
     names = [path.stem for path in SHIPPED.glob("*.yaml")]
     assert "three_vehicles" in names
     for name in names:
-        assert load_scenario(name, seed=1) == load_scenario(name, seed=2)
+        short = "vehicles" not in yaml_text.load(SHIPPED / f"{name}.yaml").value  # then the rest is drawn, as of `dock`
+        assert (load_scenario(name, seed=1) == load_scenario(name, seed=2)) is not short
     assert (
         load_scenario("three_vehicles", vehicles={"auv_1": {"start": {"depth": 9.0}}}).vehicles["auv_1"].start.depth
         == 9.0

@@ -154,8 +154,8 @@ def bound(row: Row[RunConditions], seed: int) -> float:
     run = simulate(row.conditions, seed)
     made: Any = navigator("imm", run)
     estimator = made._estimator
-    noise = _nearly_certain(estimator._filter.noise)
-    estimator._filter = along(run, PlanarModels(run.parameters, noise))
+    noise = _nearly_certain(estimator.filter.noise)
+    estimator.filter = along(run, PlanarModels(run.parameters, noise))
     estimator.reset()
     return mean_square(row, run, track(run, made))
 
