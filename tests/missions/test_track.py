@@ -131,6 +131,35 @@ def test_metrics_are_those_of_the_truth(sailed) -> None:
     assert np.sqrt(np.mean((east[straight] - 5.0) ** 2)) < 2.0  # on a lane, against 0.2 m/s across it
 
 
+def test_cross_track_of_an_oblique_leg() -> None:
+    """The truth's distance from its projection onto the leg, which lies along neither axis."""
+    begin, end = np.array([15.0, 10.0]), np.array([55.0, 110.0])
+    values = {
+        "duration": 120.0,
+        "structures": {"d": {"north": 200.0}},
+        "water": {"current": {"kind": "uniform", "speed": 0.3, "direction_deg": 150.0}},
+        "vehicles": {
+            "auv": {
+                "start": {"north": 0.0, "east": 0.0, "heading_deg": 40.0, "depth": 12.0, "speed": 1.5},
+                "mission": {
+                    "kind": "track",
+                    "pattern": {"kind": "waypoints", "points": [begin.tolist(), end.tolist()]},
+                    "depth": 12.0,
+                },
+            }
+        },
+    }
+    log = run(scenario.parse(values), seed=5).vehicle()
+    first, last = log["event"]["time"][log["event"]["kind"] == "waypoint"]
+    truth = log["truth"]
+    part = (truth["time"] > first) & (truth["time"] <= last)
+    along = (end - begin) / np.linalg.norm(end - begin)
+    off = truth["position"][part, :2] - begin
+    rms = math.sqrt(np.mean(np.sum((off - np.outer(off @ along, along)) ** 2, axis=1)))
+    # A mission decides ten times a second: which of two legs a sample at a corner is counted to may differ.
+    assert summarise(log)["cross_track_rms"] == pytest.approx(rms, rel=0.02)
+
+
 def test_a_log_without_the_settings_of_its_track_is_named(sailed) -> None:
     """In one line."""
     from dataclasses import replace
