@@ -58,15 +58,15 @@ class Gate:
         if reading.stamp > reading.received + CLOCK:
             return "clock"
         values = reading.value.tolist()
-        lost = [False] * len(values)
-        if len(values) == 6:  # a DVL's two tracks
+        stamp, reason = reading.stamp, ""
+        pairs = zip(screens, values, strict=False)
+        if len(values) == 6:  # a DVL's two tracks, either of which may be lost
             lost = np.repeat(np.isnan(reading.value.reshape(2, 3)).all(axis=1), 3).tolist()
-        reasons = [
-            screen.judge(reading.stamp, value)
-            for screen, value, away in zip(screens, values, lost, strict=False)
-            if not away
-        ]
-        return next(filter(None, reasons), "")
+            pairs = ((screen, value) for (screen, value), away in zip(pairs, lost, strict=False) if not away)
+        for screen, value in pairs:  # each of them, since each remembers what it was shown
+            found = screen.judge(stamp, value)
+            reason = reason or found
+        return reason
 
     def passed(self, readings: Sequence[Reading]) -> tuple[list[Reading], list[Outcome]]:
         """Those that may be heard, and the fates of the others."""

@@ -38,6 +38,7 @@ class Screen:
         self._changed = -math.inf  # since when the sensor has shown `_shown`
         self._shown = math.nan
         self._latest = -math.inf  # stamp
+        self._remembers = limits.rate < math.inf or limits.frozen < math.inf  # else no value depends on those before
 
     def judge(self, stamp: float, value: float) -> str:
         """The reason to refuse a value that was true at `stamp` [s]; "" if there is none."""
@@ -49,6 +50,8 @@ class Screen:
         if stamp <= self._latest:
             return "clock"
         self._latest = stamp
+        if not self._remembers:
+            return ""
         if value != self._shown:
             self._shown, self._changed = value, stamp
         elif stamp - self._changed > limits.frozen:
