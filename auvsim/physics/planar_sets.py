@@ -4,16 +4,14 @@ A vehicle's own sets are `models/<vehicle>/planar/<name>.yaml`; any other is giv
 parameter its value, unit and interval, and of itself where it came from.
 """
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
-from auvsim.base import schema, yaml_text
+from auvsim.base import model_file
 from auvsim.base.errors import InputError, unknown_name
-from auvsim.base.files import whole
 from auvsim.base.settings import Settings
 from auvsim.physics.hydrodynamics import SEA_WATER
 from auvsim.physics.planar_fit import fit_planar_model
@@ -122,13 +120,7 @@ def write(planar_set: PlanarSet, path: Path) -> None:
     # A line for each parameter, since they are read as a table; an interval's open side is null.
     shown = {name: of.model_dump(exclude={"interval"} if of.interval is None else None)
              for name, of in planar_set.parameters.items()}  # fmt: skip
-    lines = [f"  {name}: {yaml_text.dump(of, flow=True)}" for name, of in shown.items()]
-    text = "\n".join((yaml_text.dump(values).rstrip(), "parameters:", *lines, ""))
-    try:
-        with whole(path) as partial:
-            partial.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    model_file.write(path, values, "parameters", shown)
 
 
 def read(path: Path) -> PlanarSet:
@@ -137,13 +129,7 @@ def read(path: Path) -> PlanarSet:
     Raises:
         InputError: One line with the file, the line and the key at fault.
     """
-    document = yaml_text.load(path)
-    if not isinstance(document.value, Mapping):
-        raise InputError(f"{path}: a parameter set is a mapping of keys to values; `auvsim identify` writes one")
-    try:
-        return PlanarSet.model_validate_json(json.dumps(document.value, default=str), strict=True)
-    except ValidationError as error:
-        raise schema.explain(error, PlanarSet, document.value, {"": str(path), **document.places}) from None
+    return model_file.read(path, PlanarSet, "a parameter set")
 
 
 def folder(vehicle: str) -> Path:

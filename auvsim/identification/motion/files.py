@@ -1,17 +1,14 @@
 """The file of a motion model: what a filter needs to believe it, and where it came from."""
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
-from pydantic import Field, ValidationError, model_validator
+from pydantic import Field, model_validator
 
 import auvsim
-from auvsim.base import schema, yaml_text
-from auvsim.base.errors import InputError
-from auvsim.base.files import whole
+from auvsim.base import model_file
 from auvsim.base.settings import Settings
 from auvsim.identification.motion.identify import MotionIdentification, planar, verdicts
 from auvsim.physics.planar_sets import HoldOut, Noise, PlanarSet, Source, coefficients
@@ -134,13 +131,7 @@ def write(model: MotionModel, path: Path) -> None:
     """
     values = model.model_dump(mode="json")
     own = values.pop("coefficients")
-    lines = [f"  {yaml_text.dump(name).split(chr(10))[0]}: {yaml_text.dump(of, flow=True)}" for name, of in own.items()]
-    text = "\n".join((yaml_text.dump(values).rstrip(), "coefficients:", *lines, ""))
-    try:
-        with whole(path) as partial:
-            partial.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror or error}") from None
+    model_file.write(path, values, "coefficients", own)
 
 
 def read(path: Path) -> MotionModel:
@@ -149,13 +140,7 @@ def read(path: Path) -> MotionModel:
     Raises:
         InputError: One line with the file, the line and the key at fault.
     """
-    document = yaml_text.load(path)
-    if not isinstance(document.value, dict):
-        raise InputError(f"{path}: a motion model is a mapping of keys to values; `auvsim identify` writes one")
-    try:
-        return MotionModel.model_validate_json(json.dumps(document.value, default=str), strict=True)
-    except ValidationError as error:
-        raise schema.explain(error, MotionModel, document.value, {"": str(path), **document.places}) from None
+    return model_file.read(path, MotionModel, "a motion model")
 
 
 def intervals(found: MotionIdentification) -> list[tuple[str, float, float, float]]:

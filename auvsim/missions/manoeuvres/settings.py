@@ -190,15 +190,7 @@ Simple = (
     | OptimalSettings
 )
 ManoeuvreSettings = Annotated[
-    StraightSettings
-    | CircleSettings
-    | ZigzagSettings
-    | MultisineSettings
-    | PrbsSettings
-    | SpiralSettings
-    | TableSettings
-    | OptimalSettings
-    | SequenceSettings,
+    Simple | SequenceSettings,
     Field(discriminator="kind"),
 ]
 SequenceSettings.model_rebuild()
