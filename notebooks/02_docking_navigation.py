@@ -26,7 +26,7 @@ from pathlib import Path
 
 from IPython.display import Image
 
-from auvsim.cli import reproduce
+from auvsim.cli.papers import paper1 as tables
 from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
 from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
 from auvsim.reproduce.paper1 import planar as paper1
@@ -42,7 +42,7 @@ from auvsim.reproduce.paper1 import truths as paper1_truths
 # %%
 study = paper1.reproduce(seed=0, quick=True)
 judged = paper1_acceptance.verdicts(study)
-reproduce.show(study)
+tables.show(study)
 
 # %% [markdown]
 # How to read it:
@@ -99,7 +99,7 @@ Image("figure7.png")
 
 # %%
 mujoco = paper1_mujoco.reproduce(seed=0, quick=True)
-reproduce.show_mujoco(study, mujoco)
+tables.show_mujoco(study, mujoco)
 
 # %%
 files = paper1_truths.write(study, mujoco, Path())

@@ -426,8 +426,9 @@ def _run(arguments: list[str]) -> int:
         from auvsim.cli import reproduce
 
         return reproduce.run(
-            quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs, truth=command.truth
-        )
+            command.paper, quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs,
+            truth=command.truth,
+        )  # fmt: skip
 
     from auvsim.cli import products
 

@@ -10,7 +10,7 @@ import pytest
 from matplotlib.image import imread
 
 from auvsim import cli
-from auvsim.cli import reproduce as command
+from auvsim.cli.papers import paper1 as command
 from auvsim.reproduce.paper1 import acceptance as paper1_acceptance
 from auvsim.reproduce.paper1 import planar as paper1
 from auvsim.reproduce.paper1 import products as paper1_products

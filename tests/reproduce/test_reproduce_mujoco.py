@@ -256,7 +256,7 @@ def test_a_quick_look_leaves_mujoco_out(arguments, expected, tmp_path, monkeypat
 
 
 def test_the_printed_table_sets_both_truths_side_by_side(study, planar, capsys):
-    from auvsim.cli import reproduce as command
+    from auvsim.cli.papers import paper1 as command
 
     command.show_mujoco(planar, study)
     printed = capsys.readouterr().out.split("planar truth and MuJoCo's")[1]

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 from auvsim.reproduce.paper1.planar import SETTLED, Study
 from auvsim.reproduce.paper1.study import FILTERS, ROWS, Result
+from auvsim.reproduce.verdict import Verdict
 
 PAPER_MEANS = {"settled_200": 0.3530, "settled_100": 0.2850, "settled_40": 0.1011, "settled_12": 0.0603}  # Table 1 [m]
 PAPER_VARIANCES = {"settled_200": 0.0286, "settled_100": 0.0215, "settled_40": 0.0045, "settled_12": 0.0032}  # [m^2]
@@ -13,31 +14,6 @@ NO_LOSS = 1.03  # the filter that is to lose nowhere may be this much worse than
 WINS = 0.9  # better than this counts as better
 DELIVERY = "delivery"  # stands for a row where delivery is compared
 ALL = "all"  # stands for a row where all are
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Verdict:
-    """One thing to reach, and what was reached."""
-
-    row: str  # key of ROWS, or DELIVERY or ALL
-    quantity: str
-    measured: float
-    low: float
-    high: float
-    deviation: float = math.nan  # standard deviation of what was measured, if known
-    reason: str = ""  # why it is not met
-
-    @property
-    def met(self) -> bool:
-        """Whether what was measured lies within the limits."""
-        return self.low <= self.measured <= self.high
-
-    @property
-    def accept(self) -> str:
-        """The limits as text."""
-        if math.isinf(self.high):
-            return f">= {self.low:g}"
-        return f"{self.low:g} .. {self.high:g}" if self.low > 0.0 else f"<= {self.high:g}"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -1,0 +1,1 @@
+"""The papers of `auvsim reproduce`: what each prints and writes, one module for each."""
