@@ -52,7 +52,7 @@ class ModemSettings(Settings):
     )
     bearing_bias_deg: float = Field(default=0.0, description="constant error of bearings (mounting) [deg]")
     one_way: bool = Field(default=True, description="whether it takes ranges by one-way travel time")
-    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed that it assumes [m/s]")
+    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed that it assumes [m/s of sound]")
     turn_around: float = Field(
         default=2.0, gt=0.0, description="known time from the first wave front of a request to that of the reply [s]"
     )

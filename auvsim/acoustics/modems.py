@@ -27,9 +27,9 @@ UNDER_WAY = "under way"
 class SoundSettings(ChannelSettings):
     """The water in which modems talk, and their medium access."""
 
-    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed at the surface [m/s]")
+    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed at the surface [m/s of sound]")
     sound_speed_gradient: float = Field(
-        default=0.0, ge=-1.0, le=1.0, description="change of the sound speed with depth [m/s/m]"
+        default=0.0, ge=-1.0, le=1.0, description="change of the sound speed with depth [1/s]"
     )
     access: AccessSettings = Field(default=FreeSettings(), description="Medium access, by its `kind`.")
 
@@ -45,7 +45,7 @@ class SoundSettings(ChannelSettings):
         """
         if self.sound_speed + self.sound_speed_gradient * deepest < SLOWEST:
             raise InputError(
-                f"network.sound_speed_gradient: {self.sound_speed_gradient:g} m/s/m leaves less than {SLOWEST:g} m/s "
+                f"network.sound_speed_gradient: {self.sound_speed_gradient:g} 1/s leaves less than {SLOWEST:g} m/s "
                 f"at {deepest:g} m; use less"
             )
         return Medium(self.sound_speed, self.sound_speed_gradient, floor)
