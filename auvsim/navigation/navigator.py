@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from auvsim.acoustics.message import Delivery
+from auvsim.acoustics.modem import ModemSettings
 from auvsim.acoustics.usbl import UsblSettings
 from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
@@ -73,6 +74,9 @@ class NavigatorSetup:
     usbl: UsblSettings  # lever arms of the dock's USBL
     dock: StructurePose | None = None  # charted pose of the mission's dock
     sensors: Mapping[str, Any] = field(default_factory=dict)  # settings of those on board by name: data sheets, places
+    modem: ModemSettings | None = None  # data sheet of its modem
+    others: tuple[str, ...] = ()  # names of the other vehicles that have a modem
+    start: tuple[float, float] = (0.0, 0.0)  # planned, north and east [m]
 
 
 NavigatorFactory = Callable[[NavigatorSetup], Navigator]

@@ -55,6 +55,7 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
         setup=lambda other: navigator_setup(plan, log.name, vehicle, other),
         own=settings.estimator,
         vehicle=log,
+        messages=list(_messages(log)) if "received" in log else (),
     )
 
 
@@ -73,6 +74,22 @@ def _arrivals(log: VehicleLog, group: str, rank: int, plan: Scenario) -> Iterato
         yield _delivered(log, reading)
         if sequence in copies:
             yield _delivered(log, reading._replace(received=received + copies[sequence]))
+
+
+def _messages(log: VehicleLog) -> Iterator[Delivery]:
+    """The messages of other vehicles' modems."""
+    columns = log["received"]
+    rows = zip(*(columns[name].tolist() for name in columns if name != "payload"), strict=True)
+    names = [name for name in columns if name != "payload"]
+    for values, payload in zip(rows, columns["payload"], strict=True):
+        row = dict(zip(names, values, strict=True))
+        message = Message(
+            row["source"], row["destination"] or None, row["stamp"], row["kind"],
+            tuple(payload[: row["numbers"]].tolist()), row["bits"], row["sequence"],
+            answers=None if row["answers"] < 0 else row["answers"],
+        )  # fmt: skip
+        measured = (None if math.isnan(row[name]) else row[name] for name in ("range", "bearing"))
+        yield Delivery(message, row["time"], *measured, row["arrived"])
 
 
 def _delivered(log: VehicleLog, reading: Reading) -> Arrival:

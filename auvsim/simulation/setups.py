@@ -43,4 +43,7 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
         usbl=own.sensors.usbl,
         dock=plan.structures[dock].pose if dock else None,
         sensors=dict(on_board(own.sensors)),
+        modem=own.modem,
+        others=tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name),
+        start=plan.start_position(name)[:2],
     )
