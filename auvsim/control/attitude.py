@@ -51,6 +51,8 @@ class Attitude:
         roll, pitch, _ = self.angles.tolist()
         p, q, r = self.rates.tolist()
         across = q * math.sin(roll) + r * math.cos(roll)
-        turned = np.array((p + across * math.tan(pitch), q * math.cos(roll) - r * math.sin(roll), across / math.cos(pitch)))
+        turned = np.array(
+            (p + across * math.tan(pitch), q * math.cos(roll) - r * math.sin(roll), across / math.cos(pitch))
+        )
         self.angles = self.angles + turned * dt
         self._stamp = stamp

@@ -31,7 +31,9 @@ class HoveringSettings(Settings):
     attitude: Gains = Field(default=(3.0, 3.0, 6.0), description="moment per angle [N m/rad]")
     rate: Gains = Field(default=(1.2, 1.2, 3.0), description="moment per rate [N m s/rad]")
     largest: float = Field(default=60.0, ge=0.0, description="of each component of the integral's force [N]")
-    reach: float = Field(default=1.0, gt=0.0, description="distance within which the integral grows, and beyond which force does not [m]")
+    reach: float = Field(
+        default=1.0, gt=0.0, description="distance within which the integral grows, and beyond which force does not [m]"
+    )
 
 
 class Hovering:
@@ -143,7 +145,8 @@ class HoveringController:
         else:
             error, nu = np.array((np.nan, np.nan, down)), np.array((0.0, 0.0, self._depth.rate, *turn))
             steered = self._law.command(error, angles, nu, setpoints.heading)
-            thrust = math.copysign(self._ahead(abs(setpoints.speed)).surge, setpoints.speed) if setpoints.speed else 0.0
+            speed = 0.0 if isinstance(setpoints, Station) else setpoints.speed  # no estimate: it stays as it is
+            thrust = math.copysign(self._ahead(abs(speed)).surge, speed) if speed else 0.0
             demand = steered._replace(surge=steered.surge + thrust)
         self._pressed = self._pressed + self._period if self._actuation.shares(demand).max() > 1.0 else 0.0
         return demand

@@ -33,7 +33,7 @@ class HoveringDockingSettings(Settings):
     dock: str | None = Field(default=None, description="name of the structure to dock at; none: the only one")
     transit_speed: float = Field(default=0.4, gt=0, description="speed over ground to the gate [m/s]")
     creep_speed: float = Field(default=0.15, gt=0, description="speed over ground from the gate into the dock [m/s]")
-    gate_distance: float = Field(default=4.0, gt=0, description="distance of the gate before the entrance [m]")
+    gate_distance: float = Field(default=4.0, ge=3.5, description="distance of the gate before the entrance [m]")
     gate_radius: float = Field(default=0.3, gt=0, description="distance within which it is in line at the gate [m]")
     settling: float = Field(default=10.0, ge=0, description="time in line at the gate before it creeps in [s]")
     corridor: float = Field(default=0.25, gt=0, description="error across the axis above which it waits [m]")
@@ -104,7 +104,7 @@ class HoveringDocking(Mission):
             self._enter(Phase.ABORTED, now.time, f"no fix for {silence:.0f} s")
         self.finished = self.phase in (Phase.DOCKED, Phase.ABORTED)
         if self.finished:
-            return Setpoints(now.heading, now.depth, 0.0)
+            return Setpoints(self._reports.axis, now.depth, 0.0)  # in the cage it stays in line, and presses nowhere
         estimate = now.estimate
         if estimate is None or not estimate.initialised or not self._reports.count:
             return Setpoints(*self._start, 0.0)
@@ -130,7 +130,7 @@ class HoveringDocking(Mission):
             goal = self.along if outside and off else self._structure.latched + PUSH
             return np.array((goal, 0.0)), s.creep_speed
         if self.phase == Phase.GO_AROUND:
-            if self.along < 0.5 * gate[0] or abs(self.cross) > ASIDE:
+            if self.along < -NEAR or abs(self.cross) > ASIDE:
                 self._enter(Phase.HOMING, time, f"out of the dock, attempt {self.attempt}")
             return gate, s.creep_speed
         if self.along > -NEAR:  # beside or behind the dock: first clear of it, then forward

@@ -77,7 +77,11 @@ class Hold(Mission):
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
         """How well the place was held."""
-        mission, truth, settings = log["mission"], log["truth"], yaml_text.read(str(log.attributes["mission_settings"]), "log").value
+        mission, truth, settings = (
+            log["mission"],
+            log["truth"],
+            yaml_text.read(str(log.attributes["mission_settings"]), "log").value,
+        )
         reached = mission["time"][mission["phase"] == HOLDING]
         names = ("time", "position_rms", "depth_rms", "heading_rms_deg")
         if not len(reached):
