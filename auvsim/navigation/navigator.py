@@ -67,7 +67,7 @@ class NavigatorSetup:
 
     vehicle: str  # its name
     settings: Any  # of the estimator; of a user's own, its class `Settings` or what stands under `settings`
-    parameters: PlanarParameters  # the planar model that it assumes
+    parameters: PlanarParameters | None  # the planar model that it assumes; None of one that thrusters drive
     actuation: Actuation
     period: float  # time between two updates [s]
     rates: Mapping[str, float]  # of the sensors that the vehicle has, by name [Hz]

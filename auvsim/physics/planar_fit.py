@@ -1,6 +1,7 @@
 """Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics; gives the fit's error."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -85,6 +86,14 @@ class Level:
     def forces(self, u: float, *, rudder: float = 0.0, elevator: float = 0.0, shaft_speed: float = 0.0) -> Array:
         """Force and moment (6,) on a vehicle that moves straight ahead [N, N m], forward-starboard-down."""
         return FLIP6 * self._forward(u, 0.0, 0.0, Commands(rudder, elevator, shaft_speed))[:6]
+
+    def resistance(self, nu: Sequence[float]) -> Array:
+        """Force and moment (6,) on a vehicle of body velocity `nu` (6,), all actuators at rest; SNAME [N, N m]."""
+        data = self.data
+        mujoco.mj_resetData(self.model, data)
+        data.qvel[:6] = FLIP6 * np.asarray(nu)  # level: the axes of the body are those of the world
+        mujoco.mj_forward(self.model, data)
+        return FLIP6 * (data.qfrc_passive - data.qfrc_bias)[:6]
 
     def _forward(self, u: float, v: float, r: float, demand: Commands) -> Array:
         """Generalised force (nv,), gravity included, in MuJoCo's axes."""

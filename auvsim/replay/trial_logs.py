@@ -11,7 +11,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.randomness import Noise, stream
 from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog, read
-from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.propulsion import propulsion
 from auvsim.replay.recording import DELIVERED, Arrival, Recording
 from auvsim.simulation import scenario
 from auvsim.simulation.scenario import Scenario
@@ -37,8 +37,7 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
     if not len(times):
         raise InputError(f"{path}: no estimate of '{log.name}' in it; an estimator is replayed at the times it ran")
     speed = model_speed(settings.estimator)
-    shaft_speed = fit_planar_model(settings.model, speed, plan.water.density).shaft_speed_for(settings.start.speed)
-    before = vehicle.actuation.at_speed(shaft_speed)
+    before = propulsion(settings.model, speed, plan.water.density).ahead(settings.start.speed)
     command = log["command"]
     demands = zip(*(command[demand.name].tolist() for demand in vehicle.actuation.demands), strict=True)
     commands = [before, *(type(before)(*values) for values in demands)]

@@ -22,7 +22,7 @@ from auvsim.navigation.gate import Gate
 from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
 from auvsim.sensors.range import RangeSettings
@@ -83,10 +83,9 @@ class Agent:
         self.name, self.vehicle = name, vehicle
         settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
         start = settings.start
-        # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
+        # The drive of a command is always that of the vehicle's own model, so that runs differ in nothing but the
         # estimator.
-        fitted = fit_planar_model(settings.model, model_speed(settings.estimator), density)
-        self.shaft_speed = fitted.shaft_speed_for
+        ahead, holds = propulsion(settings.model, model_speed(settings.estimator), density)
         heading = math.radians(start.heading_deg)
         self.dock = usbl_dock(plan, name)
         self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does
@@ -99,7 +98,7 @@ class Agent:
                 heading=heading,
                 depth=start.depth,
                 period=1.0 / rates.control,
-                holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
+                holds=holds,
                 structures=places,
                 usbl=self.serves,
                 ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
@@ -113,10 +112,11 @@ class Agent:
             ControllerSetup(
                 settings=settings.control,
                 actuation=vehicle.actuation,
-                shaft_speed=fitted.shaft_speed_for,
+                ahead=ahead,
                 period=1.0 / rates.control,
             ),
         )
+        self._locate = getattr(self.controller, "locate", None)  # of one that steers by the estimate
         self.sensors = [
             (
                 _sensor(key, found, noise(key), vehicle),
@@ -132,7 +132,7 @@ class Agent:
         self._mission = Part("mission", "" if mission else settings.mission.kind, name)
         self._controller = Part("controller", settings.control.kind, name)
         self.estimate: Estimate | None = None
-        self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
+        self.commands: Any = ahead(start.speed)
         self._filter_ticks = round(rates.control / rates.filter)
         self._readings: list[Reading] = []  # of this control period
         self._messages: list[Delivery] = []
@@ -270,6 +270,9 @@ class Agent:
         for kind, text in estimator_events(self.estimate, e):
             log.event(time, self.name, kind, text)
         self.estimate = e
+        if self._locate is not None:
+            self._running = self._controller
+            self._locate(e)
         views = (e.position, e.heading, e.velocity, e.current)
         log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
         outcomes, self._gated = (*self._gated, *e.outcomes), []
