@@ -102,7 +102,6 @@ class HoveringDocking(Mission):
         silence = 0.0 if self._always else now.time - self._reports.last
         if self.phase not in (Phase.DOCKED, Phase.ABORTED) and silence > self._s.lost_timeout:
             self._enter(Phase.ABORTED, now.time, f"no fix for {silence:.0f} s")
-        self.finished = self.phase in (Phase.DOCKED, Phase.ABORTED)
         if self.finished:
             return Setpoints(self._reports.axis, now.depth, 0.0)  # in the cage it stays in line, and presses nowhere
         estimate = now.estimate
@@ -200,4 +199,4 @@ class HoveringDocking(Mission):
         self.events.append(Event(time, phase.name.lower(), reason))
         # The last metre belongs to the approach, whose time goes on.
         self._since = self._since if phase == Phase.FINAL else time
-        self.phase = phase
+        self.phase, self.finished = phase, phase in (Phase.DOCKED, Phase.ABORTED)
