@@ -6,11 +6,13 @@ import mujoco
 import numpy as np
 
 from auvsim.base.frames import Array
-from auvsim.water.terrain import GriddedFloor, SlopedFloor, Terrain
+from auvsim.water.terrain import SlopedFloor, Terrain
+from auvsim.water.terrain_grid import GriddedFloor
 
 WATER = (0.07, 0.27, 0.36)  # colour into which everything fades [rgb]
 TILE = 100.0  # side of the square after which the sea floor's pattern repeats [m]
 PIXELS = 512  # of the pattern along that side
+MOST_POINTS = 257  # along each side of a height field: more cost MuJoCo time and memory
 HALF_WIDTH = 1500.0  # of the sea floor [m]
 EXTENT = 100.0  # of the scene, the unit of MuJoCo's distances [m]
 MURK = (4.0, 65.0)  # distances at which the water begins to hide things and hides all [m]
@@ -56,7 +58,7 @@ def _add_sea_floor(root: Any, terrain: Terrain) -> None:
     root.asset.add("material", name="sand", texture="sand", texrepeat=(repeat, repeat), specular=0, shininess=0)
     shape: dict[str, Any] = {"type": "plane", "size": (HALF_WIDTH, HALF_WIDTH, 10)}
     if isinstance(terrain, GriddedFloor):
-        shape, place = _height_field(root, terrain)
+        shape, place = _height_field(root, terrain.coarse(MOST_POINTS))
     else:
         place = (0, 0, -terrain.depth(0.0, 0.0))
     if isinstance(terrain, SlopedFloor):
@@ -78,6 +80,7 @@ def shape_sea_floor(model: mujoco.MjModel, terrain: Terrain) -> None:
     """Puts the depths of a gridded floor into the compiled scene; any other is right already."""
     if not isinstance(terrain, GriddedFloor):
         return
+    terrain = terrain.coarse(MOST_POINTS)
     field, deepest = model.hfield(SEA_FLOOR), float(terrain.depths.max())
     heights = (deepest - terrain.depths.T[::-1]) / field.size[2]
     at = int(field.adr[0])

@@ -62,7 +62,9 @@ def test_the_stronger_of_two_survives_by_the_capture_ratio():
     places = {"a": still(-near), "b": still(far), "c": still(0.0)}
     messages = [packet("a", 1.4), packet("b", 1.0)]  # both are at c from 1.467 s
     for capture, fate in ((difference - 0.01, "delivered"), (difference + 0.01, "collision")):
-        found = fates(Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0))
+        found = fates(
+            Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0)
+        )
         assert found["a", "c", 0] == fate
         assert found["b", "c", 0] == "collision"
 
@@ -73,7 +75,9 @@ def test_interference_adds_up():
     places = {"a": still(-100.0), "b": still(700.0), "c": still(0.0), "d": still(0.0, 700.0)}
     messages = [packet("a", 1.4), packet("b", 1.0), packet("d", 1.0)]
     for capture, fate in ((difference - 3.02, "delivered"), (difference - 3.0, "collision")):
-        found = fates(Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0))
+        found = fates(
+            Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0)
+        )
         assert found["a", "c", 0] == fate
 
 
