@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -64,5 +65,5 @@ class Pulses:
 
     def _ring(self, layer: Layer, centre: Array, radius: float, colour: Colour) -> None:
         corners = centre + radius * np.stack([np.cos(self._round), np.sin(self._round), 0.0 * self._round], axis=1)
-        for begin, end in zip(corners[:-1], corners[1:], strict=True):
+        for begin, end in pairwise(corners):
             layer.join(LINE, 3.0, begin, end, colour)
