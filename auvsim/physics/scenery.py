@@ -1,5 +1,6 @@
 """Appearance of the scene: light, water and sea floor; only the height of the floor matters to physics."""
 
+import math
 from typing import Any
 
 import mujoco
@@ -144,6 +145,20 @@ def pillar_ends(sea_floor: float, depth: float, place: Array) -> Array | None:
         return None
     x, y = place.tolist()
     return np.array([x, y, -depth - PILLAR_TOP, x, y, -sea_floor])
+
+
+def widen(model: mujoco.MjModel, reach: float) -> None:
+    """Makes a level or sloping sea floor, and the view, wide enough for places up to `reach` [m] from its middle.
+
+    Its squares keep their size. What is near enough for the floor as it was made changes nothing.
+    """
+    floor = model.geom(SEA_FLOOR)
+    factor = math.ceil(2.0 * reach / HALF_WIDTH)
+    if factor <= 2 or floor.type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
+        return
+    floor.size[:2] *= factor
+    model.material("sand").texrepeat[:] *= factor
+    model.vis.map.zfar *= factor
 
 
 def paint_sea_floor(model: mujoco.MjModel) -> None:

@@ -12,6 +12,7 @@ from auvsim.physics import scenery
 from auvsim.video.layer import ARROW, DOT, LINE, Colour, Layer, Mark
 from auvsim.video.motion import Belief, Motion, VehicleMoment
 from auvsim.video.playback import Dock, Moment, Playback
+from auvsim.video.pulses import Pulses
 
 TRUE: Colour = (1.0, 0.86, 0.15, 1.0)
 ESTIMATE: Colour = (1.0, 0.25, 0.78, 1.0)
@@ -161,6 +162,7 @@ class FarMarks:
         self.layer = Layer(playback, marks, overview=True)
         self._floor = playback.model.geom("sea_floor").pos[2]
         self._stations = _stations(playback, unit)
+        self._pulses = Pulses(playback)
 
     def update(self, moment: Moment) -> None:
         """Draws the moment."""
@@ -176,6 +178,7 @@ class FarMarks:
                 _ellipse(layer, now.belief, 0.02 * unit)
                 layer.ball((0.5 * unit,) * 3, now.belief.position, np.eye(3), ESTIMATE)
             layer.join(ARROW, 0.6 * unit, now.position - forward, now.position + forward, tracks.colour)
+        self._pulses.draw(layer, moment.time)
         self._flow(moment.followed.current)
 
     def _flow(self, current: Array) -> None:
