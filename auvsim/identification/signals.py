@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from auvsim.base.errors import InputError
 from auvsim.identification.reckoning import outliers
 from auvsim.identification.records import MEASURED, Record
 from estimators.core.types import Array

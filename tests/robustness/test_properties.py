@@ -239,6 +239,17 @@ def test_many_tables(folders, changes, found, end) -> None:
     spoil_table(folders(), changes, found, end)
 
 
+@pytest.mark.parametrize("stamp", ["-5.764607523034234e+17", "-7.205759403792791e+16", "1e12"])
+def test_a_stamp_of_another_age(tmp_path, stamp: str) -> None:
+    """Its record would not fit into memory."""
+    spoil_table(tmp_path, [], [(0.5, 0, stamp)], 1.0)
+
+
+def test_a_lift_that_no_fit_bears(tmp_path) -> None:
+    """Its planar model has no steady turn."""
+    spoil_model(tmp_path, "rudder_lower_lift_slope", [1e12], 16, sails=True)
+
+
 @pytest.mark.slow
 @SLOW
 @given(pairs)
