@@ -19,7 +19,7 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.missions.track.mission import TrackSettings
-from auvsim.missions.track.patterns import points
+from auvsim.missions.track.patterns import Circle, Weave, points
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
@@ -261,7 +261,10 @@ def _places(scenario: Scenario) -> Iterator[tuple[str, float, float, float]]:
     for name, vehicle in scenario.vehicles.items():
         yield f"vehicles.{name}.start.depth", *scenario.start_position(name)
         if isinstance(vehicle.mission, TrackSettings):
-            for north, east in points(vehicle.mission.pattern).tolist():
+            pattern = vehicle.mission.pattern
+            north, east, _ = scenario.start_position(name)
+            ways = [[north, east]] if isinstance(pattern, Weave | Circle) else points(pattern).tolist()
+            for north, east in ways:
                 yield f"vehicles.{name}.mission.depth", north, east, vehicle.mission.depth
 
 

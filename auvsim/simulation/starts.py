@@ -43,16 +43,15 @@ def check(scenario: Scenario, world: Any, agents: Sequence[Any], places: Mapping
 
 
 def _check_speed(agent: Any, speed: float) -> None:
-    """Sees that the shaft can hold the speed [m/s] at which a vehicle starts."""
-    limit = getattr(agent.vehicle.actuation, "shaft_limit", None)
-    if limit is None or not hasattr(agent, "shaft_speed") or agent.shaft_speed(speed) <= limit:
+    """Sees that a vehicle can hold the speed [m/s] at which it starts."""
+    if not hasattr(agent, "holds") or agent.holds(speed):
         return
     slow, fast = 0.0, speed
     while fast - slow > 1e-3:
         middle = 0.5 * (slow + fast)
-        slow, fast = (middle, fast) if agent.shaft_speed(middle) <= limit else (slow, middle)
+        slow, fast = (middle, fast) if agent.holds(middle) else (slow, middle)
     raise InputError(
-        f"vehicles.{agent.name}.start.speed: {speed:g} m/s is more than the shaft of '{agent.vehicle.model}' can hold, "
+        f"vehicles.{agent.name}.start.speed: {speed:g} m/s is more than '{agent.vehicle.model}' can hold, "
         f"{slow:.2f} m/s"
     )
 

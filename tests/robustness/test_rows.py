@@ -91,7 +91,7 @@ def test_nor_in_a_script() -> None:
         ("--vehicle.ballast.cb_shift [0,-0.2,0]", "vehicle.ballast.cb_shift: [0.0, -0.2, 0.0] m is out of the hull"),
         ("--vehicle.ballast.cg_shift [0.9,0,0]", "vehicle.ballast.cg_shift: [0.9, 0.0, 0.0] m is out of the hull"),
         ("--vehicle.ballast.net_buoyancy 31", "vehicle.ballast.net_buoyancy: 31 N is more than 10% of the weight"),
-        ("--vehicle.start.speed 5", "vehicle.start.speed: 5 m/s is more than the shaft of 'remus100' can hold, 2.5"),
+        ("--vehicle.start.speed 5", "vehicle.start.speed: 5 m/s is more than 'remus100' can hold, 2.5"),
         ("--rates.physics 20 --world.integrator RK4", "rates.physics: 20 Hz is too slow"),
         ("--dock.depth 39.5", "dock.depth: a mouth of radius 0.75 m"),
         ("--estimator.model nowhere", "estimator.model: no planar model 'nowhere'"),

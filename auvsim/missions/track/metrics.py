@@ -52,7 +52,7 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
     }
 
 
-def _pattern(log: VehicleLog) -> patterns.Waypoints | patterns.LawnMower:
+def _pattern(log: VehicleLog) -> patterns.Waypoints | patterns.LawnMower | patterns.Law:
     """The track that a log says its vehicle had.
 
     Raises:
