@@ -46,6 +46,10 @@ def run_tasks(tasks: Sequence[Task], jobs: int | None = None, progress: Progress
             if progress:
                 progress(finished, total)
         return {task.key: results[task.key] for task in tasks}
+    except KeyboardInterrupt:
+        for process in multiprocessing.active_children():  # which Ctrl-C may not have reached
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 

@@ -16,7 +16,7 @@ from auvsim import CACHE_NOTE, RENDERER_NOTE, __version__
 from auvsim.base.errors import AuvsimError, DrawingError, InputError
 from auvsim.base.neighbours import check_estimators
 from auvsim.cli.interruption import Interruption
-from auvsim.cli.parsing import parse
+from auvsim.cli.parsing import files_first, parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
 
@@ -30,8 +30,8 @@ class Dock:
     the trial ran, docked or not; 1 the simulation diverged; 2 bad input; 130 interrupted.
     """
 
-    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """Keys that are not drawn from the seed, as YAML."""
+    scenario: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml|NAME]")] = None
+    """Keys that are not drawn from the seed, as YAML, or the name of a shipped scenario."""
     seed: int = 0
     """Seed of every random number."""
     trial: int = 0
@@ -119,8 +119,8 @@ class Metrics:
 class ScenarioText:
     """Prints the full scenario as commented YAML: the default one, or what a file and options make of it."""
 
-    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """Keys that are not drawn from the seed, as YAML."""
+    scenario: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml|NAME]")] = None
+    """Keys that are not drawn from the seed, as YAML, or the name of a shipped scenario."""
     default: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The default scenario as installed."""
 
@@ -220,7 +220,8 @@ class Identify:
     motion: bool = False
     """Also choose a motion model of a known vehicle, which then takes longer; for an unknown one it always does."""
     steps: tuple[str, ...] = ()
-    """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
+    """Of a known vehicle's planar model: segments, prediction-error or both, also with least-squares, which they
+    start from; by default all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -295,7 +296,23 @@ Command = (
     | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Auvsim:
+    """The whole command line."""
+
+    command: tyro.conf.OmitSubcommandPrefixes[tyro.conf.OmitArgPrefixes[Command]]
+    version: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Prints the version."""
+
+
 TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_NAMES = {
+    "identify": ("--steps",),
+    "estimate": ("--estimator", "--sensors"),
+    "video": ("--camera",),
+}  # several each
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -371,23 +388,29 @@ def _run(arguments: list[str]) -> int:
         from auvsim.cli import options
 
         arguments, values = options.split(arguments, TAKE_SCENARIO_KEYS[arguments[0]])
-    command: Command = parse(Command, arguments, "auvsim", _DESCRIPTION)
+    arguments = files_first(arguments, TAKE_NAMES.get(arguments[0], ()) if arguments else ())
+    command: Command = parse(Auvsim, arguments, "auvsim", _DESCRIPTION).command
     if isinstance(command, ScenarioText):
         from auvsim.cli import options
+        from auvsim.simulation.loading import find
 
-        print(options.scenario_text(command.scenario, command.default, values), end="")
+        path = find(command.scenario) if command.scenario is not None else None
+        print(options.scenario_text(path, command.default, values), end="")
         return 0
 
     if isinstance(command, Dock):
         from auvsim.cli import options, run
+        from auvsim.simulation.loading import find
 
-        scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
+        path = find(command.scenario) if command.scenario is not None else None
+        scenario = options.scenario(path, command.estimator, values, command.seed, command.trial)
         _, vehicle = scenario.lone
         if vehicle.mission.kind != "docking":
             manoeuvre = getattr(vehicle.mission, "manoeuvre", None)
             meant = f"auvsim manoeuvre {manoeuvre.kind}" if manoeuvre else "auvsim run"
             raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `{meant}`")
-        return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+        with options.located(path, values, command.estimator):
+            return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
 
     if isinstance(command, Run):
         from auvsim.cli import options, run
@@ -395,9 +418,9 @@ def _run(arguments: list[str]) -> int:
 
         path = find(command.scenario)
         scenario = options.scenario(path, None, values, command.seed, command.trial)
-        return run.run(
-            scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
-        )
+        made = {"seed": command.seed, "trial": command.trial, "out": command.out, "video": command.video}
+        with options.located(path, values):
+            return run.run(scenario, **made, name=path.stem)
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign
@@ -414,10 +437,11 @@ def _run(arguments: list[str]) -> int:
         return campaign.replay(command.plan, **which, out=command.out, video=command.video)
 
     if isinstance(command, Manoeuvre):
-        from auvsim.cli import manoeuvre
+        from auvsim.cli import manoeuvre, options
 
         plans = manoeuvre.plans(command.kinds, values, command.seed, command.trial)
-        return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
+        with options.located(manoeuvre.file_of(command.kinds), values):
+            return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
 
     if isinstance(command, Identify):
         from auvsim.cli import identify
@@ -481,4 +505,4 @@ def _run(arguments: list[str]) -> int:
             return products.again(command.log, products.show_summary)
 
 
-_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles. `auvsim --version` prints the version."
+_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles."
