@@ -1,4 +1,4 @@
-"""A vehicle from a data sheet: its estimates against the REMUS-100's published numbers, and that it does what the sheet says."""
+"""A vehicle from a data sheet: its estimates against the REMUS-100's numbers, and that it does what the sheet says."""
 
 import math
 from pathlib import Path
@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from auvsim.base import yaml_text
-from auvsim.base.errors import InputError
 from auvsim.cli import main
 from auvsim.physics import hydrodynamics, soundness
 from auvsim.physics.planar_fit import Level
