@@ -266,9 +266,9 @@ class Study:
 class ShowVehicle:
     """Shows what a vehicle does, as one holds it against a data sheet; or makes a vehicle of a data sheet.
 
-    Of a vehicle with fins: speed against shaft speed, trim, turning circles, zig-zag, dive, stopping, and the error of the planar
-    model that filters assume. Of one that thrusters drive: speed against force in each axis, stopping, a step of its place,
-    holding in a current. With --from: NAME.xml, README.md, in which every estimate is marked, and
+    Of a vehicle with fins: speed against shaft speed, trim, turning circles, zig-zag, dive, stopping, and the error of
+    the planar model that filters assume. Of one that thrusters drive: speed against force in each axis, stopping, a
+    step of its place, holding in a current. With --from: NAME.xml, README.md, in which every estimate is marked, and
     controller.yaml.
     """
 

@@ -1,4 +1,4 @@
-"""Sea trials of a vehicle that fins steer: what its MJCF does, without noise, as one would hold it against a data sheet.
+"""Sea trials of a vehicle that fins steer: what its MJCF does, without noise, as one holds it against a data sheet.
 
 Still water, 60 m down. Turning circles and zig-zags are judged as ITTC 7.5-02-06-01 and IMO MSC.137(76) have them.
 """
@@ -247,7 +247,7 @@ class _Zigzag:
 
 
 def _turning_time(fit: PlanarFit, rudder: float) -> float:
-    """Time of two turns, roughly, by the slopes of a straight course; at least a minute and a half, at most five [s]."""
+    """Time of two turns, roughly, by the slopes of a straight course; from a minute and a half to five [s]."""
     p, u = fit.parameters, fit.speed
     force = np.array(((p.Y_uv * u + p.Y_v, (p.Y_ur - p.m) * u + p.Y_r), (p.N_uv * u + p.N_v, p.N_ur * u + p.N_r)))
     rate = abs(float(np.linalg.solve(force, (-p.Y_dd * u * u * rudder, -p.N_dd * u * u * rudder))[1]))
