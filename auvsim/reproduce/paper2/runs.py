@@ -6,7 +6,7 @@ the same current, but the leader knows where it is.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +24,7 @@ DEPTH = 10.0  # of both vehicles [m]
 COURSE = math.radians(8.0)
 BEGIN = np.array([10.0, -100.0])  # where the follower is said to start [m]
 CURRENT = np.array([0.5, 0.5])  # [m/s]
+SOUND_SPEED = 1500.0  # assumed [m/s]
 
 Heading = Callable[[Array], Array]
 
@@ -69,7 +70,8 @@ TRACKS = {
 class Noise:
     """Standard deviations; the follower's start is drawn about where it is said to be."""
 
-    speed: float = 0.0  # of a sample of 1 s [m/s]
+    speed: float = 0.0  # ahead, of a sample of 1 s [m/s]
+    sway: float = 0.0  # to starboard, which is not measured, as a sample of white noise that filters assume [m/s]
     heading: float = 0.0  # of a sample of 1 s [rad]
     displacement: float = 0.0  # of a cycle's displacement along each axis [m]
     leader: float = 0.0  # of the leader's broadcast place along each axis [m]
@@ -80,7 +82,7 @@ class Noise:
     def odometry(self) -> OdometryNoise:
         """The same as a filter is to assume it."""
         return OdometryNoise(
-            forward=self.speed**2, heading=self.heading**2, position=self.displacement**2 / CYCLE
+            forward=self.speed**2, starboard=self.sway**2, heading=self.heading**2, position=self.displacement**2 / CYCLE
         )
 
 
@@ -103,28 +105,56 @@ class Conditions:
     shear: tuple[float, float] = (0.0, 0.0)  # by which the leader's current differs from the follower's [m/s]
 
 
+class Errors(NamedTuple):
+    """What is no white noise: errors that last the whole run."""
+
+    compass_bias: float = 0.0  # [rad]
+    speed_scale: float = 0.0  # of the speed log: measured over true, minus 1
+    sound_speed: float = 0.0  # true over assumed, minus 1
+    clock_drift: float = 0.0  # of the follower's clock against the leader's [s/s]
+
+
+class Motion(NamedTuple):
+    """True ways at whole seconds, and the follower's motion through the water in between."""
+
+    follower: Array  # (k + 1, 2) [m]
+    current: Array  # (k + 1, 2) [m/s]
+    through_water: Array  # (k, 3) speed ahead and to starboard [m/s], heading [rad]
+    leader: Array  # (k + 1, 2) [m]
+    depth: Array  # (k + 1,) of the follower [m]
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Run:
     """What happened, at whole seconds."""
 
     noise: Noise
-    truth: Array  # (k, 4) north, east [m], current [m/s] of the follower
-    leader: Array  # (k, 2) true place [m]
-    inputs: Array  # (k - 1, 3) measured speed ahead and to starboard [m/s], heading [rad]
+    truth: Array  # (k + 1, 4) north, east [m], current [m/s] of the follower
+    leader: Array  # (k + 1, 2) true place [m]
+    inputs: Array  # (k, 3) measured speed ahead and to starboard [m/s], heading [rad]
     packets: dict[int, Measurement]  # by second; those that were not lost
 
+    @property
+    def nodes(self) -> list[Node[Any]]:
+        """Times, inputs and measurements, for what works on a whole log."""
+        inputs = [*map(tuple, self.inputs.tolist()), ()]
+        heard = [[self.packets[k]] if k in self.packets else [] for k in range(len(inputs))]
+        return [Node(float(k), u, measured, True) for k, (u, measured) in enumerate(zip(inputs, heard, strict=True))]
 
-def leader_and_follower(conditions: Conditions) -> tuple[Array, Array, Array, Array]:
-    """Without noise: follower (k, 2) from its nominal start, leader (k, 2), current (k - 1, 2), heading (k - 1,)."""
+
+def planar_motion(conditions: Conditions) -> Motion:
+    """The follower from its nominal start, and the leader."""
     tracks = TRACKS[conditions.tracks]
     t = np.arange(float(CYCLES * CYCLE))
     angle = conditions.turn * t / t[-1]
     c, s = np.cos(angle), np.sin(angle)
     current = np.stack((c * CURRENT[0] - s * CURRENT[1], s * CURRENT[0] + c * CURRENT[1]), axis=1)
     heading = tracks.follower_heading(t)
+    through_water = np.stack((np.full_like(t, SPEED), np.zeros_like(t), heading), axis=1)
     follower = way(BEGIN, heading, current)
     leader = way(np.array(tracks.leader), tracks.leader_heading(t), current + np.array(conditions.shear))
-    return follower, leader, current, heading
+    current = np.vstack((current, current[-1:]))
+    return Motion(follower, current, through_water, leader, np.full(len(follower), DEPTH))
 
 
 def way(begin: Array, heading: Array, current: Array) -> Array:
@@ -134,67 +164,39 @@ def way(begin: Array, heading: Array, current: Array) -> Array:
 
 
 def simulate(conditions: Conditions, seed: int) -> Run:
-    """The run of a seed. Conditions that differ in one thing share all the draws of the rest."""
-    noise = NOISES[conditions.noise]
-    follower, leader, current, heading = leader_and_follower(conditions)
+    """The planar run of a seed. Conditions that differ in one thing share all the draws of the rest."""
+    return measured(planar_motion(conditions), NOISES[conditions.noise], seed, loss=conditions.loss)
+
+
+def measured(motion: Motion, noise: Noise, seed: int, *, loss: float = 0.0, errors: Errors = Errors()) -> Run:
+    """What is measured and heard in a motion, whose start is moved to where the seed has it."""
 
     def draws(name: str, *shape: int) -> Array:
         return stream(seed, 0, f"paper2/{name}").standard_normal(shape)
 
-    k = len(heading)
-    follower = follower + noise.begin * draws("begin", 2)
-    inputs = np.zeros((k, 3))
+    k = len(motion.through_water)
+    follower = motion.follower + noise.begin * draws("begin", 2)
     aside = noise.displacement / math.sqrt(CYCLE) * draws("displacement", k, 2)
-    inputs[:, 0] = SPEED + noise.speed * draws("speed", k) + aside[:, 0]
-    inputs[:, 1] = aside[:, 1]
-    inputs[:, 2] = heading + noise.heading * draws("heading", k)
-    told = leader[::CYCLE] + noise.leader * draws("leader", CYCLES + 1, 2)
-    ranges = np.hypot(*(follower - leader)[::CYCLE].T) + noise.range * draws("range", CYCLES + 1)
-    heard = stream(seed, 0, "paper2/loss").random(CYCLES + 1) >= conditions.loss
+    ahead = (1.0 + errors.speed_scale) * motion.through_water[:, 0] + noise.speed * draws("speed", k) + aside[:, 0]
+    heading = motion.through_water[:, 2] + errors.compass_bias + noise.heading * draws("heading", k)
+    when, cycles = np.arange(CYCLES + 1.0) * CYCLE, CYCLES + 1
+    told = motion.leader[::CYCLE] + noise.leader * draws("leader", cycles, 2)
+    depth = motion.depth[::CYCLE]
+    distance = np.hypot(np.hypot(*(follower - motion.leader)[::CYCLE].T), depth - DEPTH)
+    ranges = distance / (1.0 + errors.sound_speed) + SOUND_SPEED * errors.clock_drift * when
+    ranges += noise.range * draws("range", cycles)
+    heard = stream(seed, 0, "paper2/loss").random(cycles) >= loss
     packets = {
         n * CYCLE: leader_range(
             ranges[n], (*told[n], DEPTH), deviation=max(noise.range, 1e-3), leader_deviation=noise.leader,
-            stamp=float(n * CYCLE), sequence=n,
+            stamp=float(n * CYCLE), depth=float(depth[n]), sequence=n,
         )
         for n in np.flatnonzero(heard).tolist()
     }  # fmt: skip
-    current = np.vstack((current, current[-1:]))
-    return Run(noise=noise, truth=np.hstack((follower, current)), leader=leader, inputs=inputs, packets=packets)
-
-
-class Followed(NamedTuple):
-    """How a filter follows a run, at the ends of cycles, from the first packet on."""
-
-    times: Array  # (k,) [s]
-    means: Array  # (k, 4) north, east, current
-    covariances: Array  # (k, 4, 4)
-    state: Any  # the last
-
-
-def follow(run: Run, filter_: Filter[Any]) -> Followed:
-    """The estimates of a filter; packets come without delay."""
-    first = Node(0.0, (), [run.packets[0]] if 0 in run.packets else [], True)
-    state: Any = filter_.start([first], 0)
-    means, covariances = [], []
-    inputs = run.inputs.tolist()
-    for second in range(1, len(run.truth)):
-        state = filter_.predict(state, inputs[second - 1], 1.0)
-        if second % CYCLE:
-            continue
-        if (packet := run.packets.get(second)) is not None:
-            state = filter_.correct(state, float(second), [packet])
-        belief = state.belief
-        means.append(belief.mean[:4])
-        covariances.append(belief.covariance[:4, :4])
-    return Followed(CYCLE * np.arange(1.0, CYCLES + 1.0), np.array(means), np.array(covariances), state)
-
-
-def prior(noise: Noise, **deviations: float) -> Gaussian:
-    """What a filter that knows the noises assumes at the start; `deviations` of further states by name."""
-    known = {"north": noise.begin, "east": noise.begin, "current_north": 1.0, "current_east": 1.0}
-    return SPACE.belief({"north": BEGIN[0], "east": BEGIN[1]}, known | deviations)
-
-
-def four(belief: Gaussian) -> Gaussian:
-    """Position and current of a belief alone, as the paper's filter has them."""
-    return replace(belief, mean=belief.mean[:4], covariance=belief.covariance[:4, :4])
+    return Run(
+        noise=noise,
+        truth=np.hstack((follower, motion.current)),
+        leader=motion.leader,
+        inputs=np.stack((ahead, aside[:, 1], heading), axis=1),
+        packets=packets,
+    )
