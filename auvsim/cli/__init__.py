@@ -129,13 +129,12 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
-    gives the same numbers, on however many cores.
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv and the paper's figures as PNG,
+    figures and tables of its own beside them. The same seed gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019)."""
+    paper: Annotated[Literal["paper1", "paper2"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019); paper2: ranges to a leader in an unknown current."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0

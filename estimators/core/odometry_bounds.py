@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from estimators.core import loops
 from estimators.core.compiling import compiled
 from estimators.core.errors import ParameterError
-from estimators.core.models.odometry import Displacement, N, move, show_bearing, show_range, spread
+from estimators.core.models.odometry import Displacement, N, OdometryNoise, move, show_bearing, show_range, spread
 from estimators.core.types import Array
 
 DEFICIENT = 1e-6  # singular value over the largest below which a direction counts as unobservable
@@ -38,14 +38,16 @@ def at_once(
     return Sights(times, displacements, every * range_deviation**2, every * bearing_deviation**2, times[None])
 
 
-def bounds(prior: Array, sights: Sights, relative: Array, outputs: Array, walks: Array | None = None) -> Array:
+def bounds(
+    prior: Array, sights: Sights, relative: Array, outputs: NDArray[np.int64], walks: Array | None = None
+) -> Array:
     """Bounds of the covariance (s, o, 9, 9) at the sights `outputs` (o,), averaged over the draws of losses.
 
     Args:
         prior: Covariance (9, 9) at the start; zero for what is known.
         sights: What is measured when.
-        relative: (s, m, k, 3) at each station from what is ranged to the vehicle, north and east, and how deep below the
-            vehicle it is [m]; of m truths each, over which information is averaged.
+        relative: (s, m, k, 3) at each station from what is ranged to the vehicle, north and east, and how deep below
+            the vehicle that is [m]; of m truths each, over which information is averaged.
         outputs: Places among the sights, ascending.
         walks: Densities (9,) of random walks of the states [unit^2/s].
 
@@ -75,7 +77,7 @@ def bounds(prior: Array, sights: Sights, relative: Array, outputs: Array, walks:
     return full
 
 
-def _last_heard(times: Array, arrivals: Array, outputs: Array) -> NDArray[np.int64]:
+def _last_heard(times: Array, arrivals: Array, outputs: NDArray[np.int64]) -> NDArray[np.int64]:
     """The last sight (o,) that has arrived at each output; -1 if none has."""
     heard = np.flatnonzero(np.isfinite(arrivals))
     late = arrivals[heard]
@@ -175,7 +177,9 @@ def displacements_between(rows: Array, ends: NDArray[np.int64]) -> Array:
     return np.diff(total, axis=0, prepend=np.zeros((1, 6)))
 
 
-def sampled(forward: Array, starboard: Array, heading: Array, dt: float, noise) -> Array:
-    """Displacements (t, 6), one for each sample of speeds [m/s] and heading [rad], all (t,), held for `dt` [s]."""
-    u = zip(forward.tolist(), starboard.tolist(), heading.tolist(), strict=True)
-    return np.array([Displacement().extended(f, s, h, dt, noise) for f, s, h in u])
+def sampled(inputs: Array, dt: float, noise: OdometryNoise) -> Array:
+    """Displacements (t, 6), one for each row of inputs (t, 3): speed ahead and to starboard [m/s], heading [rad].
+
+    Each is held for `dt` [s].
+    """
+    return np.array([Displacement().extended(f, s, h, dt, noise) for f, s, h in inputs.tolist()])

@@ -31,9 +31,7 @@ class Geometry(NamedTuple):
     variance: float = 0.0  # summed of the ranges [m^2]
     sums: tuple[float, ...] = (0.0,) * 9  # of t, t^2, n, e, t n, t e, n^2 + e^2, range, its square
 
-    def extended(
-        self, since: Displacement, north: float, east: float, distance: float, variance: float
-    ) -> "Geometry":
+    def extended(self, since: Displacement, north: float, east: float, distance: float, variance: float) -> "Geometry":
         """With one range more, to a leader at `north`, `east`, after a displacement."""
         t, n, e = self.time + since.duration, self.north + since.north, self.east + since.east
         noise = self.noise + max(since.north_north, since.east_east)

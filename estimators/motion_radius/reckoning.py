@@ -45,10 +45,7 @@ class DeadReckoning:
         since = state.since.extended(u[0], u[1], u[2], duration, self._noise)
         return ReckonedState(state.begin, since)
 
-    def correct(
-        self, state: ReckonedState, node_time: float, measurements: Sequence[Measurement]
-    ) -> ReckonedState:
+    def correct(self, state: ReckonedState, node_time: float, measurements: Sequence[Measurement]) -> ReckonedState:
         """The same state, since dead reckoning uses nothing."""
         refused = tuple((m, NO_MODEL, math.nan) for m in measurements)
         return state._replace(verdicts=(*state.verdicts, *refused))
-

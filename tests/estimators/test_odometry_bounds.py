@@ -1,4 +1,4 @@
-"""Bounds at many stations: the Fisher information of a whole trajectory by brute force, delay, losses, observability."""
+"""Bounds at many stations: Fisher information of a whole trajectory by brute force, delay, losses, observability."""
 
 import numpy as np
 import pytest
@@ -19,7 +19,9 @@ DEVIATIONS = {
 def mission(k=9, dt=20.0):
     """Times, displacements (k, 6) and a beacon's places (k, 3), lopsided."""
     n = np.arange(k)
-    rows = sampled(1.3 + 0.2 * np.cos(n), 0.1 * np.sin(2 * n), 0.4 + 0.5 * np.sin(0.7 * n), dt, NOISE)
+    rows = sampled(
+        np.column_stack((1.3 + 0.2 * np.cos(n), 0.1 * np.sin(2 * n), 0.4 + 0.5 * np.sin(0.7 * n))), dt, NOISE
+    )
     beacon = np.stack((100.0 - 9.0 * n, 40.0 + 25.0 * np.sin(0.5 * n), 6.0 + n), axis=1)
     return dt * (n + 1.0), rows, beacon
 
@@ -63,7 +65,8 @@ def brute_force(rows, beacon, used, output, *, ranges=True, bearings=True, sigma
 
     H = derivative(lambda u: seen(rows, beacon, u, ranges, bearings))
     weights = np.concatenate(
-        ([np.where(used, sigma_r**-2, 0.0)] if ranges else []) + ([np.where(used, sigma_b**-2, 0.0)] if bearings else [])
+        ([np.where(used, sigma_r**-2, 0.0)] if ranges else [])
+        + ([np.where(used, sigma_b**-2, 0.0)] if bearings else [])
     )
     J = H.T @ (weights[:, None] * H)
     J[:9, :9] += np.diag(SPACE.vector(DEVIATIONS) ** -2.0)
@@ -120,7 +123,9 @@ def test_draws_of_losses_are_averaged_and_overtaking_is_refused():
     none, lost = times.copy(), np.where(np.arange(9) % 2, times, np.inf)
     prior = np.diag(SPACE.vector(DEVIATIONS) ** 2)
     sights = at_once(times, rows, range_deviation=1.5)
-    each = [bounds(prior, sights._replace(arrivals=a[None]), relative(rows, beacon), np.array([8])) for a in (none, lost)]
+    each = [
+        bounds(prior, sights._replace(arrivals=a[None]), relative(rows, beacon), np.array([8])) for a in (none, lost)
+    ]
     both = bounds(prior, sights._replace(arrivals=np.array([none, lost])), relative(rows, beacon), np.array([8]))
     assert both == pytest.approx(0.5 * (each[0] + each[1]), rel=1e-12)
     assert each[1][0, 0, 0, 0] > each[0][0, 0, 0, 0]
@@ -152,9 +157,7 @@ def test_known_states_stay_known_and_cost_nothing():
     sights = at_once(times, rows, range_deviation=1.5)
     found = bounds(prior, sights, relative(rows, beacon), np.array([8]))[0, 0]
     assert not found[4:].any()
-    more = bounds(
-        np.diag(SPACE.vector(DEVIATIONS) ** 2), sights, relative(rows, beacon), np.array([8])
-    )[0, 0]
+    more = bounds(np.diag(SPACE.vector(DEVIATIONS) ** 2), sights, relative(rows, beacon), np.array([8]))[0, 0]
     assert np.linalg.eigvalsh(more[:4, :4] - found[:4, :4]).min() > -1e-9  # what is unknown never helps
 
 
@@ -172,7 +175,7 @@ def test_rank_is_two_without_relative_motion_three_on_constant_courses_and_four_
 
 
 def test_displacements_of_samples_add_up():
-    rows = sampled(np.array([1.0, 2.0, 3.0]), np.zeros(3), np.array([0.1, 0.2, 0.3]), 1.0, NOISE)
+    rows = sampled(np.array([(1.0, 0.0, 0.1), (2.0, 0.0, 0.2), (3.0, 0.0, 0.3)]), 1.0, NOISE)
     summed = displacements_between(rows, np.array([1, 3]))
     whole = Displacement()
     for f, h in ((2.0, 0.2), (3.0, 0.3)):

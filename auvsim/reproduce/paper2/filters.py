@@ -40,8 +40,9 @@ def prior(noise: Noise, extra: Mapping[str, float]) -> Gaussian:
     return SPACE.belief({"north": BEGIN[0], "east": BEGIN[1]}, {**known, **extra})
 
 
-def _bank(noise: Noise, extra: Mapping[str, float], side: int = 7) -> Filter[Any]:
-    return BankFilter(prior(noise, extra), noise.odometry, side=side)
+def _bank(noise: Noise, extra: Mapping[str, float], side: int = 7, walk: float = 0.0) -> Filter[Any]:
+    walks = SPACE.vector({"current_north": walk, "current_east": walk})
+    return BankFilter(prior(noise, extra), noise.odometry, side=side, walks=walks)
 
 
 def _reckoning(noise: Noise, extra: Mapping[str, float]) -> Filter[Any]:
@@ -61,6 +62,7 @@ def _paper(
 
 
 SWEEP = ((1e8, 1e7), (1e6, 1e5), (1e4, 1e3), (1e3, 10.0), (100.0, 1.0), (10.0, 0.25))  # P1: m^2, (m/s)^2
+WALK = 3e-6  # density of the current's random walk: 0.09 m/s in 2500 s [m^2/s^3]
 METHODS = {
     "reckoning": Method("dead reckoning", _reckoning),
     "paper": Method("paper, reading A", _paper),
@@ -69,6 +71,7 @@ METHODS = {
     "paper_nine": Method("paper, N + 1 terms", partial(_paper, terms=9)),
     "ekf": Method("range EKF", partial(_bank, side=1)),
     "bank": Method("bank of 49", _bank),
+    "bank_walk": Method("bank, current walks", partial(_bank, walk=WALK)),
     "batch": Method("batch (smoothed)", _bank, smooths=True),
     **{f"p1_{k}": Method(f"P1 = {p:g}, {u:g}", partial(_paper, variances=(p, u))) for k, (p, u) in enumerate(SWEEP)},
 }

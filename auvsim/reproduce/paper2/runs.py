@@ -12,9 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from auvsim.base.randomness import stream
-from estimators.core.history import Filter, Node
-from estimators.core.models.odometry import SPACE, OdometryNoise
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.history import Node
+from estimators.core.models.odometry import OdometryNoise
+from estimators.core.types import Array, Measurement
 from estimators.motion_radius.ranges import leader_range
 
 SPEED = 2.0  # of both vehicles through the water [m/s]
@@ -36,9 +36,7 @@ def straight(off_deg: float = 0.0) -> Heading:
 
 def sine(amplitude_deg: float, period: float, phase_deg: float = 0.0) -> Heading:
     """A weave of the heading about the common course."""
-    return lambda t: (
-        COURSE + math.radians(amplitude_deg) * np.sin(2.0 * math.pi * t / period + math.radians(phase_deg))
-    )
+    return lambda t: COURSE + math.radians(amplitude_deg) * np.sin(2.0 * math.pi * t / period + math.radians(phase_deg))
 
 
 class Tracks(NamedTuple):
@@ -82,7 +80,10 @@ class Noise:
     def odometry(self) -> OdometryNoise:
         """The same as a filter is to assume it."""
         return OdometryNoise(
-            forward=self.speed**2, starboard=self.sway**2, heading=self.heading**2, position=self.displacement**2 / CYCLE
+            forward=self.speed**2,
+            starboard=self.sway**2,
+            heading=self.heading**2,
+            position=self.displacement**2 / CYCLE,
         )
 
 
@@ -112,6 +113,9 @@ class Errors(NamedTuple):
     speed_scale: float = 0.0  # of the speed log: measured over true, minus 1
     sound_speed: float = 0.0  # true over assumed, minus 1
     clock_drift: float = 0.0  # of the follower's clock against the leader's [s/s]
+
+
+NO_ERRORS = Errors()
 
 
 class Motion(NamedTuple):
@@ -168,7 +172,7 @@ def simulate(conditions: Conditions, seed: int) -> Run:
     return measured(planar_motion(conditions), NOISES[conditions.noise], seed, loss=conditions.loss)
 
 
-def measured(motion: Motion, noise: Noise, seed: int, *, loss: float = 0.0, errors: Errors = Errors()) -> Run:
+def measured(motion: Motion, noise: Noise, seed: int, *, loss: float = 0.0, errors: Errors = NO_ERRORS) -> Run:
     """What is measured and heard in a motion, whose start is moved to where the seed has it."""
 
     def draws(name: str, *shape: int) -> Array:

@@ -22,7 +22,7 @@ class Score(NamedTuple):
     nees: float  # of the position after SETTLED, per axis
     current_500: float  # current error [m/s]
     current_1000: float
-    current_bias: float  # mean over time after SETTLED of the error north [m/s]
+    current_bias: float  # size of the mean error of the current after SETTLED [m/s]
     peak: float  # largest position error up to SETTLED [m]
     rank: int = 4  # of the information, as the filter says
     mirror: bool = False  # whether it says that there is a second solution
@@ -75,25 +75,25 @@ def score(run: Run, followed: Followed) -> Score:
 
 def summarise(scores: Sequence[Score]) -> Result:
     """All runs together."""
-    count, by = len(scores), Score(*map(np.array, zip(*scores, strict=True)))  # arrays over runs
-    late = np.asarray(by.late)
-    rms = math.sqrt(late.mean())
+    table = np.array(scores, dtype=float)  # (runs, values)
+    by = {name: table[:, k] for k, name in enumerate(Score._fields)}
+    rms = math.sqrt(by["late"].mean())
     return Result(
-        runs=count,
+        runs=len(scores),
         rms=rms,
-        rms_deviation=_deviation(late) / (2.0 * rms),
-        median=float(np.median(np.sqrt(late))),
-        final=math.sqrt(np.mean(by.final)),
-        nees=float(np.mean(by.nees)),
-        nees_deviation=_deviation(np.asarray(by.nees)),
-        current_500=float(np.median(by.current_500)),
-        current_1000=float(np.median(by.current_1000)),
-        current_bias=float(np.median(by.current_bias)),
-        peak=float(np.median(by.peak)),
-        lost=float(np.mean(np.asarray(by.final) > LOST**2)),
-        rank_2=float(np.mean(np.asarray(by.rank) == 2)),
-        rank_3=float(np.mean(np.asarray(by.rank) == 3)),
-        mirror=float(np.mean(by.mirror)),
+        rms_deviation=_deviation(by["late"]) / (2.0 * rms),
+        median=float(np.median(np.sqrt(by["late"]))),
+        final=math.sqrt(by["final"].mean()),
+        nees=float(by["nees"].mean()),
+        nees_deviation=_deviation(by["nees"]),
+        current_500=float(np.median(by["current_500"])),
+        current_1000=float(np.median(by["current_1000"])),
+        current_bias=float(np.median(by["current_bias"])),
+        peak=float(np.median(by["peak"])),
+        lost=float(np.mean(by["final"] > LOST**2)),
+        rank_2=float(np.mean(by["rank"] == 2)),
+        rank_3=float(np.mean(by["rank"] == 3)),
+        mirror=float(by["mirror"].mean()),
     )
 
 

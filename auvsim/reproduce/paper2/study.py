@@ -34,12 +34,15 @@ ROBUST = ("paper", "ekf", "bank")
 LOSSES = (0.0, 0.2, 0.4, 0.6)
 
 
+NOMINAL = Conditions()
+
+
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Row:
     """Runs of one kind, and who follows them."""
 
     title: str
-    conditions: Conditions = Conditions()
+    conditions: Conditions = NOMINAL
     methods: tuple[str, ...]
     runs: int = 60
     quick_runs: int = 10
@@ -67,7 +70,7 @@ ROWS = {
     },
     "p1": Row(title="weave, nominal, P1 swept", methods=tuple(f"p1_{k}" for k in range(len(SWEEP)))),
     **{
-        f"turn_{degrees}": Row(title=f"current turns by {degrees} deg", methods=ROBUST,
+        f"turn_{degrees}": Row(title=f"current turns by {degrees} deg", methods=(*ROBUST, "bank_walk"),
                                conditions=Conditions(turn=math.radians(degrees)))
         for degrees in (5, 45)
     },
@@ -83,7 +86,7 @@ ERRORS = {
     "clock": (Errors(clock_drift=1e-6), {"range_offset": 0.1, "range_drift": 1e-6 * SOUND_SPEED}),
 }
 TOGETHER = (
-    Errors(*(sum(getattr(e, name) for e, _ in ERRORS.values()) for name in Errors._fields)),
+    Errors(*np.sum([errors for errors, _ in ERRORS.values()], axis=0).tolist()),
     {name: deviation for _, states in ERRORS.values() for name, deviation in states.items()},
 )
 PHYSICAL = {**ERRORS, "together": TOGETHER}  # by row: what is wrong, and deviations of the states that answer it
@@ -94,7 +97,7 @@ PHYSICAL_TITLES = {
 PHYSICAL_NOISE = replace(NOISES["nominal"], sway=0.02)
 PHYSICAL_RUNS = 300
 MOTIONS, QUICK_MOTIONS = 10, 2  # ways of the vehicle, among which the runs are shared out
-QUICK_PHYSICAL_RUNS = 30
+QUICK_PHYSICAL_RUNS = 20
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -180,7 +183,7 @@ def planar_bound(name: str, seeds: list[int]) -> tuple[float, float]:
 def run_bound(motion: Motion, runs: list[Run], extra: Mapping[str, float]) -> tuple[float, float]:
     """Rms of the bound, its information averaged over the runs' truths and its covariance over their losses."""
     noise, ends = runs[0].noise, CYCLE * np.arange(CYCLES + 1)
-    rows = displacements_between(sampled(*motion.through_water.T, 1.0, noise.odometry), ends)
+    rows = displacements_between(sampled(motion.through_water, 1.0, noise.odometry), ends)
     heard = np.array([[second in run.packets for second in ends.tolist()] for run in runs])
     arrivals = np.unique(np.where(heard, ends.astype(float), np.inf), axis=0)
     below = np.zeros(CYCLES + 1)
@@ -240,4 +243,3 @@ def example(seed: int, noise: str = "nominal") -> tuple[Run, dict[str, tuple[Arr
         spread = np.sqrt(np.diagonal(followed.covariances, axis1=1, axis2=2))
         tracks[key] = (followed.means, spread)
     return run, tracks
-
