@@ -24,6 +24,7 @@ from estimators.motion_radius.ranges import KIND
 
 SAME = 0.05  # squared normalised distance below which two filters have come to the same solution
 IMPROBABLE = 1e-6  # probability below which a filter is given up
+BREADTH = 1.135  # variance of the normal density that weighs 7 currents a side so that their mixture has the start's
 REACH, WIDTH = 1.8, 0.36  # outermost currents of the bank and deviation of each, in deviations of the start's current
 
 
@@ -149,7 +150,7 @@ def spread_over_currents(start: Gaussian, side: int) -> tuple[Array, Array, Arra
     shrink = np.ones(N)
     shrink[2:4] = WIDTH
     covariances = np.repeat((start.covariance * np.outer(shrink, shrink))[None], len(grid), axis=0)
-    weights = np.exp(-0.5 * np.sum(grid**2, axis=1) / (1.0 - WIDTH**2))
+    weights = np.exp(-0.5 * np.sum(grid**2, axis=1) / BREADTH)
     return means, covariances, weights / weights.sum()
 
 

@@ -54,14 +54,14 @@ def solve(
     times, displacements, ranges = _gathered(nodes, noise)
     q = np.zeros(N) if walks is None else np.array(walks, dtype=float)
     free = np.flatnonzero(np.diagonal(start.covariance) + q > 0.0)
-    means = _walked_back(displacements, end)
+    means = _walked_back(displacements, end)  # the start, and each range
     for iteration in range(1, iterations + 1):
         before = means
         means, covariances = _smooth(start.mean, start.covariance, displacements, ranges, q, free, before)
         if not np.isfinite(means).all():
             break
         if np.abs(means[:, :2] - before[:, :2]).max() < TOLERANCE:
-            return Smoothed(times, means, covariances, iteration)
+            return Smoothed(times, means[1:], covariances[1:], iteration)
     raise NotFiniteError(f"smoothing of {len(ranges)} ranges has not converged after {iterations} iterations")
 
 
@@ -83,13 +83,13 @@ def _gathered(nodes: Sequence[Node[Any]], noise: OdometryNoise) -> tuple[Array, 
 
 
 def _walked_back(displacements: Array, end: Array) -> Array:
-    """States (k, 9) that lead to `end`, the errors and the current as they are there."""
-    means = np.repeat(np.array(end, dtype=float)[None], len(displacements), axis=0)
+    """States (k + 1, 9) that lead to `end`, the errors and the current as they are there."""
+    means = np.repeat(np.array(end, dtype=float)[None], len(displacements) + 1, axis=0)
     F, following = np.eye(N), np.empty(N)
     for k in range(len(means) - 1, 0, -1):
         still = means[k].copy()
         still[5] = -still[5]
-        move(still, tuple(displacements[k]), following, F)
+        move(still, tuple(displacements[k - 1]), following, F)
         means[k - 1, :2] = 2.0 * still[:2] - following[:2]
         means[k - 1, 4] = following[4]
     return means
@@ -97,25 +97,24 @@ def _walked_back(displacements: Array, end: Array) -> Array:
 
 @compiled
 def _smooth(mean, covariance, displacements, ranges, q, free, at):
-    """Means (k, 9) and covariances (k, 9, 9) given all ranges, everything linearised at the states `at` (k, 9)."""
+    """Means and covariances (k + 1, ...) at the start and each of k ranges, all linearised at `at` (k + 1, 9)."""
     k, n = at.shape
     x, P = mean.copy(), covariance.copy()
     xs, Ps = np.empty((k, n)), np.empty((k, n, n))
     predicted, spreads, Fs = np.empty((k, n)), np.empty((k, n, n)), np.empty((k, n, n))
     F, work, following, H = np.eye(n), np.empty((n, n)), np.empty(n), np.empty((1, n))
     R, residual = np.empty((1, 1)), np.empty(1)
-    for i in range(k):
-        d = (displacements[i, 0], displacements[i, 1], displacements[i, 2],
-             displacements[i, 3], displacements[i, 4], displacements[i, 5])  # fmt: skip
-        origin = at[i - 1] if i else mean
-        move(origin, d, following, F)
-        x = following + F @ (x - origin)
+    xs[0], Ps[0] = x, P
+    for i in range(1, k):
+        e, r = displacements[i - 1], ranges[i - 1]
+        d = (e[0], e[1], e[2], e[3], e[4], e[5])
+        move(at[i - 1], d, following, F)
+        x = following + F @ (x - at[i - 1])
         P = P.copy()
         spread(P, F, d, q, work)
         predicted[i], spreads[i], Fs[i] = x, P, F
-        expected = show_range(at[i], ranges[i, 2], ranges[i, 3], ranges[i, 4], H)
-        residual[0] = ranges[i, 0] - expected - (H[0] @ (x - at[i]))
-        R[0, 0] = ranges[i, 1]
+        residual[0] = r[0] - show_range(at[i], r[2], r[3], r[4], H) - H[0] @ (x - at[i])
+        R[0, 0] = r[1]
         x, P, _, _, _, _ = loops.correct(x, P, H, residual, R, np.inf)
         xs[i], Ps[i] = x, P
     m = len(free)

@@ -26,8 +26,8 @@ PAPER = (
     ("rms at the end", '"markedly improved"', lambda r: f"{r['paper'].final:.1f} m"),
 )
 LEGEND = (
-    "rms [m] is of the position after 500 s, beside half its 95 % interval; U [m/s] is the median error of the current; "
-    "lost: more than 200 m off at the end; NEES is of the position per axis, 1 if consistent; flagged: runs whose filter "
+    "rms [m] is of the position after 500 s, beside half its 95 % interval; U [m/s] is the median current error; "
+    "lost: more than 200 m off at the end; NEES: of the position per axis, 1 if consistent; flagged: runs whose filter "
     "says that the geometry cannot tell. Reading A is the paper's algorithm as printed, C has the derivative that "
     "belongs to its covariance."
 )

@@ -80,15 +80,15 @@ def study_rows(study: Study) -> Iterable[Sequence[Any]]:
 def figure2(shown: Tracks) -> Figure:
     """Tracks of the leader and of the follower, true and estimated."""
     run, tracks = shown
-    figure = Figure(figsize=(12.0, 6.0), layout="constrained")
+    figure = Figure(figsize=(13.0, 5.5), layout="constrained")
     axes = figure.subplots()
-    axes.plot(*run.leader.T[::-1], color="#d62728", lw=1.4, label="leader")
-    axes.plot(run.truth[:, 1], run.truth[:, 0], color="black", lw=2.4, label="follower, truth")
+    axes.plot(*run.leader.T, color="#d62728", lw=1.4, label="leader")
+    axes.plot(run.truth[:, 0], run.truth[:, 1], color="black", lw=2.4, label="follower, truth")
     for key in ("reckoning", "paper", "bank"):
         means = tracks[key][0]
-        axes.plot(means[:, 1], means[:, 0], color=COLOURS[key], lw=1.3, ls=(0, (4, 2)), label=LABELS[key])
+        axes.plot(means[:, 0], means[:, 1], color=COLOURS[key], lw=1.3, ls=(0, (4, 2)), label=LABELS[key])
     axes.set_aspect("equal", adjustable="datalim")
-    dress(axes, "The paper's x is north, its y is east", "east [m]", "north [m]")
+    dress(axes, "Axes as in the paper: its x is north here, its y east", "x, north [m]", "y, east [m]")
     finish(figure, axes, "Figure 2: tracks, weave, nominal noise")
     return figure
 
