@@ -65,6 +65,33 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Bound:
+    """Maps how well followers can know position and current at best, over where a leader, beacon or dock starts.
+
+    The Cramer-Rao bound of the planned tracks, with the scenario's noises, losses and delays, before anything is run:
+    bound_FOLLOWER.png and bound_FOLLOWER.nc of each follower. Blind and mirror regions are marked. Any key of the
+    scenario is an option too, as of `auvsim run`.
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
+    """The scenario, or the name of a shipped one (leader_follower)."""
+    out: Path = Path("out")
+    """Folder of the maps."""
+    move: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Vehicle, range sensor (its beacon) or structure that starts elsewhere; by default what is heard first."""
+    span: float | None = None
+    """Width of the square of stations about the follower's start [m]; by default wide enough for the planned one."""
+    side: int = 51
+    """Stations along each side of the square."""
+    after: float | None = None
+    """Time from which the position counts [s]; by default a third of the duration."""
+    blind: float = 50.0
+    """Bound of the position from which a station counts as blind [m]."""
+    seed: int = 0
+    """Seed of the current, where that is random."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Manoeuvre:
     """Runs manoeuvres of the vehicle, for its identification: KIND.nc and KIND.png each.
 
@@ -281,6 +308,7 @@ class ShowVehicle:
 Command = (
     Dock
     | Run
+    | Bound
     | Campaign
     | Report
     | Manoeuvre
@@ -294,7 +322,7 @@ Command = (
     | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
-TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "bound": Bound, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -397,6 +425,16 @@ def _run(arguments: list[str]) -> int:
         return run.run(
             scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
         )
+
+    if isinstance(command, Bound):
+        from auvsim.cli import bound, options
+        from auvsim.simulation.loading import find
+
+        scenario = options.scenario(find(command.scenario), None, values, command.seed, 0)
+        return bound.run(
+            scenario, out=command.out, move=command.move, span=command.span, side=command.side, after=command.after,
+            blind=command.blind, seed=command.seed,
+        )  # fmt: skip
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign

@@ -28,6 +28,7 @@ class Sights(NamedTuple):
     range_variance: Array  # (k,) or (s, k) [m^2]; inf: no range
     bearing_variance: Array  # (k,) or (s, k) [rad^2]; inf: no bearing
     arrivals: Array  # (d, k) [s], of d draws of what is lost (inf) and late, none overtaking another
+    by_compass: Array | None = None  # (k,) whether a bearing is by the vehicle's compass; None: all are
 
 
 def at_once(
@@ -70,6 +71,7 @@ def bounds(
         np.array(prior[:size, :size], dtype=float), np.ascontiguousarray(sights.displacements), relative,
         np.ascontiguousarray(np.broadcast_to(sights.range_variance, shape)),
         np.ascontiguousarray(np.broadcast_to(sights.bearing_variance, shape)),
+        np.ones(k, dtype=bool) if sights.by_compass is None else np.array(sights.by_compass, dtype=bool),
         np.isfinite(sights.arrivals), last, np.array(outputs, dtype=np.int64), q[:size],
     )  # fmt: skip
     full = np.zeros((*found.shape[:2], N, N))
@@ -88,7 +90,7 @@ def _last_heard(times: Array, arrivals: Array, outputs: NDArray[np.int64]) -> ND
 
 
 @compiled
-def _bounds(prior, displacements, relative, range_variance, bearing_variance, heard, last, outputs, q):
+def _bounds(prior, displacements, relative, range_variance, bearing_variance, by_compass, heard, last, outputs, q):
     stations, truths, k = relative.shape[0], relative.shape[1], relative.shape[2]
     draws, n = heard.shape[0], prior.shape[0]
     found = np.zeros((stations, len(outputs), n, n))
@@ -116,6 +118,8 @@ def _bounds(prior, displacements, relative, range_variance, bearing_variance, he
                             P = loops.correct(mean, P, H9[:, :n].copy(), zero, R, math.inf)[1]
                         if bearing_variance[s, i] < math.inf:
                             show_bearing(x, 0.0, 0.0, H9)
+                            if not by_compass[i]:
+                                H9[0, 8] = 0.0
                             R[0, 0] = bearing_variance[s, i] * truths
                             P = loops.correct(mean, P, H9[:, :n].copy(), zero, R, math.inf)[1]
                 while o < len(outputs) and last[draw, o] == i:
@@ -139,35 +143,42 @@ def _predicted(P, Fs, displacements, q, begin, end, work, total):
 
 
 class Observability(NamedTuple):
-    """What ranges, or bearings, tell of position and current to first order, with no prior and perfect odometry."""
+    """What is told of position and current to first order, with no prior and perfect odometry."""
 
-    singular_values: Array  # (s, 4) of the derivative of all by position at the start and duration times current [m/m]
+    singular_values: Array  # (s, 4) of the derivative of all by position at the start and span times current
     rank: NDArray[np.int64]  # (s,) of 4
 
     @property
     def condition(self) -> Array:
         """Largest over smallest singular value (s,)."""
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", invalid="ignore"):
             return self.singular_values[:, 0] / self.singular_values[:, -1]
 
 
-def observability(times: Array, relative: Array, *, bearings: bool = False, span: float = 1000.0) -> Observability:
-    """Singular values and rank of ranges (or of bearings times distance) at stations.
+def observability(
+    times: Array, relative: Array, *, ranges: Array | bool = True, bearings: Array | bool = False, span: float = 1000.0
+) -> Observability:
+    """Singular values and rank of ranges, and of bearings times distance, at stations.
 
     Args:
         times: (k,) [s].
         relative: (s, k, 3) from what is ranged to the vehicle, as of `bounds`.
-        bearings: Of bearings instead of ranges.
+        ranges: (s, k) or for all, whether there is a range.
+        bearings: (s, k) or for all, whether there is a bearing.
         span: Time [s] by which a current counts as a displacement.
     """
-    if bearings:
-        direction = np.stack((-relative[..., 1], relative[..., 0]), axis=-1)
-        direction /= np.linalg.norm(relative[..., :2], axis=-1, keepdims=True)
-    else:
-        direction = relative[..., :2] / np.linalg.norm(relative, axis=-1, keepdims=True)
-    H = np.concatenate((direction, direction * (times / span)[:, None]), axis=-1)
-    values = np.linalg.svd(H, compute_uv=False)
-    rank = np.sum(values > DEFICIENT * values[..., :1], axis=-1)
+    shape = relative.shape[:2]
+    along = relative[..., :2] / np.maximum(np.linalg.norm(relative, axis=-1, keepdims=True), 1e-9)
+    across = np.stack((-relative[..., 1], relative[..., 0]), axis=-1)
+    across = across / np.maximum(np.linalg.norm(across, axis=-1, keepdims=True), 1e-9)
+    rows = [
+        direction * np.broadcast_to(told, shape)[..., None]
+        for direction, told in ((along, ranges), (across, bearings))
+        if np.any(told)
+    ] or [np.zeros((*shape, 2))]
+    parts = [np.concatenate((row, row * (times / span)[:, None]), axis=-1) for row in rows]
+    values = np.linalg.svd(np.concatenate(parts, axis=1), compute_uv=False)
+    rank = np.sum(values > DEFICIENT * np.maximum(values[..., :1], 1e-300), axis=-1)
     return Observability(values, rank)
 
 
