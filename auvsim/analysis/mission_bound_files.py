@@ -33,7 +33,7 @@ def write(found: FollowerBound, folder: Path) -> list[Path]:
 
 def figure(found: FollowerBound) -> Figure:
     """Maps of the bound of position and current over where the moved one starts, with the planned ways."""
-    figure = Figure(figsize=(15.0, 8.0), layout="constrained")
+    figure = Figure(figsize=(15.0, 7.0), layout="constrained")
     left, right = figure.subplots(1, 2)
     symbols = [_symbol(found, name, k) for k, name in enumerate(found.ways)]
     if found.moved not in found.ways:

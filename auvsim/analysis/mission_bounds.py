@@ -15,16 +15,16 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.simulation import building
 from auvsim.simulation.scenario import Scenario
-from estimators.core.history import Node
-from estimators.core.models.odometry import SPACE, Displacement
+from estimators.core.models.odometry import SPACE, Displacement, N
 from estimators.core.odometry_bounds import Sights, bounds, observability, sampled
 from estimators.core.types import Gaussian
-from estimators.motion_radius.bank import BankFilter
+from estimators.motion_radius.bank import BankFilter, BankState
 from estimators.motion_radius.geometry import PROBABLE, second_solution
 from estimators.motion_radius.ranges import leader_range
 
 OUTPUTS = 40  # times at which the bound is kept
 COARSE = 13  # stations along each axis at which mirror solutions are looked for
+NARROW = 0.1  # deviation of the current of filters that look for mirror solutions [m/s]
 HEARD = 0.5  # share of packets that arrive from which a source counts as heard
 BLOCK = 500  # stations at once, for the memory
 Progress = Callable[[float, float], None]
@@ -104,13 +104,13 @@ def mission_bounds(
         )
     names = list(dict.fromkeys(s.name for found in heard.values() for s in found))
     if moved is not None and moved not in names:
-        raise InputError(f"--moved {moved}: nobody ranges to it; they do to {', '.join(names)}")
+        raise InputError(f"--move {moved}: nobody ranges to it; they do to {', '.join(names)}")
     moved = moved or names[0]
     followers = [name for name, found in heard.items() if any(s.name == moved for s in found)]
-    found = []
+    steady, found = field.steady_uniform, []
     for count, name in enumerate(followers):
         done = _Share(progress, count, len(followers))
-        found.append(_bound(scenario, name, heard[name], moved, ways, span, side, after, blind, done))
+        found.append(_bound(scenario, name, heard[name], moved, ways, steady, span, side, after, blind, done))
     return found
 
 
@@ -126,10 +126,11 @@ class _Share:
 
 
 def _bound(
-    scenario: Scenario, name: str, heard: Sequence[Source], moved: str, ways: dict[str, Way], span: float | None,
-    side: int, after: float | None, blind: float, done: _Share,
+    scenario: Scenario, name: str, heard: Sequence[Source], moved: str, ways: dict[str, Way], steady: bool,
+    span: float | None, side: int, after: float | None, blind: float, done: _Share,
 ) -> FollowerBound:  # fmt: skip
-    own, about = ways[name], odometry(scenario, name)
+    own = ways[name]
+    about = odometry(scenario, name, own, steady)
     mover = next(s for s in heard if s.name == moved)
     north_0, east_0 = (ways[moved].places[0] if moved in ways else mover.places[0, :2]).tolist()
     start = (north_0, east_0)
@@ -224,33 +225,57 @@ def _at(stations, start, own, about, heard, moved, prior, times, order, rows, ou
 
 
 def _mirrors(coarse, start, own, about, heard, moved, prior, times, order, rows, done) -> Array:
-    """Probability (m, n) of a second solution in a bank of filters that is given ranges without noise."""
+    """Probability (m, n) of a second solution, by filters from it and from the truth on ranges without noise."""
     found = np.zeros((len(coarse[0]), len(coarse[1])))
     if any(source.bearing_variance is not None for source in heard):
         return found  # a bearing has no mirror
-    middle = SPACE.vector({"north": own.places[0, 0], "east": own.places[0, 1]})
-    bank = BankFilter(Gaussian(mean=middle, covariance=prior), about.noise, walks=about.walks)
-    begin = bank.start([Node(0.0, (), [], True)], 0)
+    bank = BankFilter(
+        Gaussian(mean=np.zeros(N), covariance=prior), about.noise, walks=about.walks, pruned=len(times) + 1
+    )
+    mine = own.at(times)
     for m, n in np.ndindex(*found.shape):
         station = np.array([[coarse[0][m], coarse[1][n]]])
         relative = _relative(station, start, own, heard, moved, times, order)
+        state = _truth_and_mirrors(own, prior, relative[0], times, about.walks)
+        places = mine - relative[0] * (1.0, 1.0, -1.0)
         variances = _variances(heard, relative, order)[0][0]
-        mine, state = own.at(times), begin
-        for k, (row, off, variance) in enumerate(
-            zip(rows.tolist(), relative[0].tolist(), variances.tolist(), strict=True)
-        ):
-            since = Displacement(*(a + b for a, b in zip(state.since, row, strict=True)))
-            state = state._replace(since=since)
-            if math.isfinite(variance):
-                place = (mine[k, 0] - off[0], mine[k, 1] - off[1], mine[k, 2] + off[2])
-                heard_range = leader_range(
-                    math.hypot(*off), place, deviation=math.sqrt(variance), stamp=times[k], depth=mine[k, 2]
-                )
-                state = bank.correct(state._replace(verdicts=()), times[k], [heard_range])
-        means, covariances = state.modes
-        found[m, n] = second_solution(means, covariances, state.weights)[1]
+        for k, row in enumerate(rows.tolist()):
+            state = state._replace(
+                since=Displacement(*(a + b for a, b in zip(state.since, row, strict=True))), verdicts=()
+            )
+            if math.isfinite(variances[k]):
+                told = leader_range(
+                    float(np.linalg.norm(relative[0, k])), (*places[k].tolist(),), deviation=math.sqrt(variances[k]),
+                    stamp=times[k], depth=mine[k, 2],
+                )  # fmt: skip
+                state = bank.correct(state, times[k], [told])
+        found[m, n] = second_solution(*state.modes, state.weights)[1]
         done(0.7 + 0.3 * (m * found.shape[1] + n + 1) / found.size)
     return found
+
+
+def _truth_and_mirrors(own: Way, prior: Array, relative: Array, times: Array, walks: Array) -> BankState:
+    """A bank of narrow filters: one at the true current, others where the mean relative motion is mirrored.
+
+    Ranges are the same if the motion relative to what is ranged is reflected in the first line of sight. Where that
+    motion bends they are only nearly so, whence means over the whole, a half and a quarter of the mission are tried.
+    """
+    heading, speed = own.inputs[:, 2], own.inputs[:, 0]
+    through_water = np.array((np.mean(speed * np.cos(heading)), np.mean(speed * np.sin(heading))))
+    current = (own.places[-1] - own.places[0]) / (STEP * len(speed)) - through_water
+    sight = relative[0, :2] / max(float(np.hypot(*relative[0, :2])), 1e-9)
+    currents = [current]
+    for share in (1.0, 0.5, 0.25):
+        k = max(1, round(share * (len(times) - 1)))
+        velocity = (relative[k, :2] - relative[0, :2]) / (times[k] - times[0])
+        currents.append(current + 2.0 * ((velocity @ sight) * sight - velocity))
+    means = np.zeros((len(currents), N))
+    means[:, :2], means[:, 2:4] = own.places[0], currents
+    narrow = np.ones(N)
+    narrow[2:4] = np.minimum(1.0, NARROW / np.sqrt(np.maximum(np.diagonal(prior)[2:4], 1e-12)))
+    weights = np.exp(-0.5 * np.sum(means[:, 2:4] ** 2 / np.maximum(np.diagonal(prior)[2:4], 1e-12), axis=1))
+    covariances = np.repeat((prior * np.outer(narrow, narrow))[None], len(currents), axis=0)
+    return BankState(means, covariances, weights / weights.sum(), walks)
 
 
 def _nearest(coarse, values: Array, axes: tuple[Array, Array]) -> Array:

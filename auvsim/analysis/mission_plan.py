@@ -100,8 +100,16 @@ def way(scenario: Scenario, name: str, field: CurrentField) -> Way:
     return Way(places=np.array(places), depths=np.array(depths), inputs=np.array(inputs))
 
 
-def odometry(scenario: Scenario, name: str) -> Odometry:
-    """Noise and constant errors of a vehicle's DVL and compass, and what its estimator assumes at the start.
+def odometry(scenario: Scenario, name: str, own: Way, steady: bool) -> Odometry:
+    """Noise and constant errors of a vehicle's DVL and compass, and how well its estimator knows start and current.
+
+    A constant error of the DVL's velocity is one of its scale and of its mounting, at the planned speed.
+
+    Args:
+        scenario: Every number definite.
+        name: Of the vehicle.
+        own: Its way.
+        steady: Whether the current is the same everywhere and always; else it walks as the estimator assumes.
 
     Raises:
         InputError: It has no DVL.
@@ -119,14 +127,14 @@ def odometry(scenario: Scenario, name: str) -> Odometry:
         forward=forward**2 / dvl.rate,
         starboard=starboard**2 / dvl.rate,
         heading=math.radians(compass.heading_noise_deg) ** 2 / compass.rate,
-        position=float(getattr(estimator, "position_noise", 0.0)),
     )
+    constant = dvl.bias / max(0.1, float(own.inputs[:, 0].mean()))
+    mounting = math.radians(math.hypot(compass.heading_bias_deg, dvl.misalignment_deg))
     deviations = {
         "north": position, "east": position, "current_north": current, "current_east": current,
-        "speed_scale": dvl.scale_error,
-        "compass_bias": math.radians(math.hypot(compass.heading_bias_deg, dvl.misalignment_deg)),
+        "speed_scale": math.hypot(dvl.scale_error, constant), "compass_bias": math.hypot(mounting, constant),
     }  # fmt: skip
-    walk = float(getattr(estimator, "current_noise", 0.0))
+    walk = 0.0 if steady else float(getattr(estimator, "current_noise", 0.0))
     return Odometry(noise, deviations, SPACE.vector({"current_north": walk, "current_east": walk}))
 
 

@@ -15,6 +15,7 @@ from auvsim.cli.report import StudyProgress
 from auvsim.cli.run import output_folder
 from auvsim.simulation.scenario import Scenario
 
+WIDTH = 110  # of the table [columns]
 MOST = 301  # stations along an axis
 
 
@@ -41,22 +42,25 @@ def run(
                 scenario, moved=move, seed=seed, span=span, side=side, after=after, blind=blind, progress=progress
             )
         written = [path for bound in found for path in mission_bound_files.write(bound, out)]
-    Console(markup=False).print(table(found))
+    console = Console(markup=False, width=max(WIDTH, Console().width))
+    console.print(table(found))
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
 
 
 def table(found: list[FollowerBound]) -> Table:
-    """One line for each follower."""
+    """One line for each follower: as planned, at the best station, and shares of all stations."""
+    after = f"{found[0].after:.0f}"
     lines = Table(
-        title=f"Cramer-Rao bound over where {found[0].moved} starts", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0)
+        title=f"Cramer-Rao bound over {found[0].settled.size} starts of {found[0].moved}",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
     )
     lines.add_column("follower", no_wrap=True)
     for heading in (
-        "as planned [m]", "current [m/s]", "rank", "mirror", "best [m]", "best start, north, east [m]", "blind",
-        "mirrored", "stations",
+        f"rms after {after} s [m]", "current [m/s]", "rank", "mirror", "best rms", "there (N, E)", "blind", "mirrored",
     ):  # fmt: skip
-        lines.add_column(heading, justify="right")
+        lines.add_column(heading, justify="right", no_wrap=True)
     for bound in found:
         m, n = (int(np.abs(a - x).argmin()) for a, x in zip((bound.north, bound.east), bound.start, strict=True))
         settled = np.where(bound.blind, np.inf, bound.settled)
@@ -69,6 +73,5 @@ def table(found: list[FollowerBound]) -> Table:
         lines.add_row(
             bound.follower, f"{bound.settled[m, n]:.2f}", f"{bound.current[m, n, -1]:.4f}", f"{bound.rank[m, n]} of 4",
             f"{bound.mirror[m, n]:.0%}", *best, f"{bound.blind.mean():.0%}", f"{bound.mirrored.mean():.0%}",
-            str(settled.size),
         )  # fmt: skip
     return lines
