@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from auvsim.analysis.style import dress
 from auvsim.base.frames import Array
@@ -46,7 +47,7 @@ class Region(NamedTuple):
     """A part of a map that is marked by dots."""
 
     label: str
-    inside: Array  # (m, n) of truth values on the map's grid
+    inside: NDArray[np.bool_]  # (m, n) on the map's grid
 
 
 class MapEllipse(NamedTuple):

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from auvsim.analysis import bound_maps
 from auvsim.analysis.bound_maps import BoundMap, Region, Symbol
@@ -63,7 +64,7 @@ def content(found: FollowerBound) -> Content:
     """Everything on the grid, as a file that describes itself."""
     place, whole = ("north", "east"), ("north", "east", "time")
 
-    def field(dimensions: tuple[str, ...], values: Array, units: str, meaning: str) -> Field:
+    def field(dimensions: tuple[str, ...], values: NDArray[Any], units: str, meaning: str) -> Field:
         return Field(dimensions, np.ascontiguousarray(values), {"units": units, "long_name": meaning})
 
     what = f"start of {found.moved}"
