@@ -6,6 +6,7 @@ import pytest
 from estimators.core.errors import ParameterError
 from estimators.core.models.odometry import SPACE, Displacement, OdometryNoise
 from estimators.core.odometry_bounds import Sights, at_once, bounds, displacements_between, observability, sampled
+from estimators.core.types import Array
 
 NOISE = OdometryNoise(forward=0.01, starboard=0.003, heading=2e-4, position=0.02)
 CURRENT = np.array([0.4, -0.25])
@@ -18,12 +19,13 @@ DEVIATIONS = {
 
 def mission(k=9, dt=20.0):
     """Times, displacements (k, 6) and a beacon's places (k, 3), lopsided."""
-    n = np.arange(k)
+    n = np.arange(k, dtype=np.float64)
     rows = sampled(
         np.column_stack((1.3 + 0.2 * np.cos(n), 0.1 * np.sin(2 * n), 0.4 + 0.5 * np.sin(0.7 * n))), dt, NOISE
     )
     beacon = np.stack((100.0 - 9.0 * n, 40.0 + 25.0 * np.sin(0.5 * n), 6.0 + n), axis=1)
-    return dt * (n + 1.0), rows, beacon
+    times: Array = np.asarray(dt * (n + 1.0), dtype=np.float64)
+    return times, rows, beacon
 
 
 def way(rows, errors=None):

@@ -51,7 +51,7 @@ def test_the_weave_is_the_specifications():
 def test_rank_of_each_geometry_is_as_said(name):
     motion = planar_motion(Conditions(tracks=name))
     off = np.column_stack((motion.follower - motion.leader, np.zeros(len(motion.leader))))[::CYCLE]
-    found = observability(np.arange(len(off)) * float(CYCLE), off[None])
+    found = observability(np.arange(0.0, CYCLE * len(off), CYCLE), off[None])
     assert found.rank[0] == TRACKS[name].rank
     if name == "weave":
         assert found.condition[0] == pytest.approx(8.5, abs=0.5)
