@@ -65,6 +65,33 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Bound:
+    """Maps how well followers can know position and current at best, over where a leader, beacon or dock starts.
+
+    The Cramer-Rao bound of the planned tracks, with the scenario's noises, losses and delays, before anything is run:
+    bound_FOLLOWER.png and bound_FOLLOWER.nc of each follower. Blind and mirror regions are marked. Any key of the
+    scenario is an option too, as of `auvsim run`.
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
+    """The scenario, or the name of a shipped one (leader_follower)."""
+    out: Path = Path("out")
+    """Folder of the maps."""
+    move: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Vehicle, range sensor (its beacon) or structure that starts elsewhere; by default what is heard first."""
+    span: float | None = None
+    """Width of the square of stations about the follower's start [m]; by default wide enough for the planned one."""
+    side: int = 51
+    """Stations along each side of the square."""
+    after: float | None = None
+    """Time from which the position counts [s]; by default a third of the duration."""
+    blind: float = 50.0
+    """Bound of the position from which a station counts as blind [m]."""
+    seed: int = 0
+    """Seed of the current, where that is random."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Manoeuvre:
     """Runs manoeuvres of the vehicle, for its identification: KIND.nc and KIND.png each.
 
@@ -129,13 +156,12 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
-    gives the same numbers, on however many cores.
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv and the paper's figures as PNG,
+    figures and tables of its own beside them. The same seed gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019)."""
+    paper: Annotated[Literal["paper1", "paper2"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019); paper2: ranges to a leader in an unknown current."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0
@@ -283,6 +309,7 @@ class ShowVehicle:
 Command = (
     Dock
     | Run
+    | Bound
     | Campaign
     | Report
     | Manoeuvre
@@ -307,7 +334,7 @@ class Auvsim:
     """Prints the version."""
 
 
-TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "bound": Bound, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
 TAKE_NAMES = {
     "identify": ("--steps",),
     "estimate": ("--estimator", "--sensors"),
@@ -421,6 +448,16 @@ def _run(arguments: list[str]) -> int:
         made = {"seed": command.seed, "trial": command.trial, "out": command.out, "video": command.video}
         with options.located(path, values):
             return run.run(scenario, **made, name=path.stem)
+
+    if isinstance(command, Bound):
+        from auvsim.cli import bound, options
+        from auvsim.simulation.loading import find
+
+        scenario = options.scenario(find(command.scenario), None, values, command.seed, 0)
+        return bound.run(
+            scenario, out=command.out, move=command.move, span=command.span, side=command.side, after=command.after,
+            blind=command.blind, seed=command.seed,
+        )  # fmt: skip
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign
