@@ -1,0 +1,81 @@
+"""A follower that localises itself by its leader: the contract of all methods, and dead reckoning, the first of them."""
+
+from abc import ABC, abstractmethod
+
+import numpy as np
+
+from estimators.core import loops
+from estimators.core.errors import ParameterError
+from estimators.core.types import Array, Gaussian
+from estimators.path_prediction.kinematics import advance
+from estimators.path_prediction.messages import Noise, Packet, Pulse
+
+
+class Follower(ABC):
+    """An estimator of the pose of a vehicle with odometry that hears pulses and packets of a leader.
+
+    Its joint belief begins with the follower's pose north, east [m], heading [rad], which is not wrapped.
+
+    Args:
+        start: Pose (3,) at the time 0.
+        noise: Of the follower's odometry.
+        size: States of the joint belief.
+    """
+
+    def __init__(self, start: Gaussian, noise: Noise, size: int = 3) -> None:
+        self.time, self.noise = 0.0, noise
+        self.mean, self.covariance = np.zeros(size), np.zeros((size, size))
+        self.mean[:3], self.covariance[:3, :3] = start.mean, start.covariance
+        self.fit: dict[int, float] = {}  # log-likelihood of each pulse used, by number
+
+    @property
+    def belief(self) -> Gaussian:
+        """The follower's pose (3,)."""
+        return Gaussian(mean=self.mean[:3].copy(), covariance=self.covariance[:3, :3].copy())
+
+    @property
+    def leader(self) -> tuple[float, Array] | None:
+        """A time [s] and where this method takes the leader to have been (2,) then; None before the first packet."""
+        return None
+
+    def advance(self, time: float, speed: float, yaw_rate: float) -> None:
+        """Moves on to a time [s] with the odometry [m/s, rad/s] held, in steps that are no longer than its period.
+
+        Raises:
+            ParameterError: The time goes backwards.
+        """
+        if not time >= self.time:
+            raise ParameterError(f"time {time} s must not come before {self.time} s")
+        advance(self.mean, self.covariance, 0, speed, yaw_rate, time - self.time, *self.noise)
+        self.time = time
+
+    @abstractmethod
+    def hear(self, pulse: Pulse) -> None:
+        """Takes a pulse at the time of its detection."""
+
+    @abstractmethod
+    def receive(self, packet: Packet) -> None:
+        """Takes a packet at the time of its reception."""
+
+    def correct(self, H: Array, residual: Array, R: Array, number: int | None = None) -> None:
+        """Kalman correction of the joint belief by a residual (m,) = H (m, n) error + noise of covariance R (m, m).
+
+        Args:
+            number: Of the pulse, to note how well it fitted.
+        """
+        result = loops.correct(self.mean, self.covariance, H, residual, R, np.inf)
+        if result[-1] != loops.OK:
+            return  # what cannot be used changes nothing
+        self.mean, self.covariance = result[0], result[1]
+        if number is not None:
+            self.fit[number] = -0.5 * (result[4] + float(np.linalg.slogdet(result[3])[1]))
+
+
+class DeadReckoning(Follower):
+    """Hears nothing."""
+
+    def hear(self, pulse: Pulse) -> None:
+        """Nothing."""
+
+    def receive(self, packet: Packet) -> None:
+        """Nothing."""
