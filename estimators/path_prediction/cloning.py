@@ -11,7 +11,7 @@ from estimators.core.loops import wrap
 from estimators.core.types import Array, Gaussian
 from estimators.path_prediction.follower import Follower
 from estimators.path_prediction.kinematics import clone, replace, transport
-from estimators.path_prediction.messages import Noise, Packet, Pulse, seen
+from estimators.path_prediction.messages import Noise, Packet, Pulse, curved, seen
 
 ERROR, CLONES = 3, 6  # places of the leader's error and of the first clone
 
@@ -25,6 +25,7 @@ class CloningFilter(Follower):
         clones: How many pulses wait for packets at most; more than the longest delay over the period.
         interpolated: Whether a pulse whose packet is lost is used at the next packet, the leader interpolated.
         interpolation_variance: What interpolation adds to the leader's position along each axis [m^2].
+        bends: See `Follower`.
     """
 
     def __init__(
@@ -35,8 +36,9 @@ class CloningFilter(Follower):
         clones: int = 8,
         interpolated: bool = True,
         interpolation_variance: float = 4.0,
+        bends: bool = True,
     ) -> None:
-        super().__init__(start, noise, CLONES + 3 * clones)
+        super().__init__(start, noise, CLONES + 3 * clones, bends=bends)
         self._interpolated, self._interpolation_variance = interpolated, interpolation_variance
         self._pulses: list[Pulse | None] = [None] * clones
         self._packet: Packet | None = None  # the newest one
@@ -68,10 +70,10 @@ class CloningFilter(Follower):
         due = [k for k, p in enumerate(self._pulses) if p is not None and p.number <= packet.number]
         for slot in sorted(due, key=lambda k: _number(self._pulses[k])):
             pulse, self._pulses[slot] = self._pulses[slot], None
-            if pulse is None or (pulse.number < packet.number and (before is None or not self._interpolated)):
-                continue
-            leader = packet.pose if pulse.number == packet.number else interpolated(before, packet, pulse.emitted)
-            self._use(slot, pulse, leader, packet)
+            if pulse is not None and pulse.number == packet.number:
+                self._use(slot, pulse, packet.pose, packet)
+            elif pulse is not None and before is not None and self._interpolated:
+                self._use(slot, pulse, interpolated(before, packet, pulse.emitted), packet)
 
     def _move_error(self, before: Packet, packet: Packet) -> None:
         east, north = packet.pose[1] - before.pose[1], packet.pose[0] - before.pose[0]
@@ -96,8 +98,12 @@ class CloningFilter(Follower):
         place = leader[:2] - back @ self.mean[ERROR : ERROR + 3]
         if (found := seen(pulse, self.mean[at : at + 3], place)) is None:
             return
-        H = np.zeros((found.residual.size, self.mean.size))
-        H[:, at : at + 3], H[:, ERROR : ERROR + 3] = found.by_follower, -found.by_leader @ back
+        J = np.zeros((2, self.mean.size))  # of the vector from the follower to the leader
+        J[:, at : at + 2], J[:, ERROR : ERROR + 3] = -np.eye(2), -back
+        if self._bends:
+            found = curved(found, pulse, J @ self.covariance @ J.T)
+        H = found.by_leader @ J
+        H[:, at + 2] = found.by_follower[:, 2]
         R = found.covariance
         if leader is not packet.pose:
             R = R + self._interpolation_variance * found.by_leader @ found.by_leader.T

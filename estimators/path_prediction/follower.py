@@ -1,4 +1,4 @@
-"""A follower that localises itself by its leader: the contract of all methods, and dead reckoning, the first of them."""
+"""A follower that localises itself by its leader: the contract of all methods, and dead reckoning, the first one."""
 
 from abc import ABC, abstractmethod
 
@@ -7,7 +7,7 @@ import numpy as np
 from estimators.core import loops
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array, Gaussian
-from estimators.path_prediction.kinematics import advance
+from estimators.path_prediction.kinematics import advance, bend
 from estimators.path_prediction.messages import Noise, Packet, Pulse
 
 
@@ -20,10 +20,13 @@ class Follower(ABC):
         start: Pose (3,) at the time 0.
         noise: Of the follower's odometry.
         size: States of the joint belief.
+        bends: Whether predictions and pulses are taken to second order, which a long silence needs; the published
+            filters take the first alone.
     """
 
-    def __init__(self, start: Gaussian, noise: Noise, size: int = 3) -> None:
-        self.time, self.noise = 0.0, noise
+    def __init__(self, start: Gaussian, noise: Noise, size: int = 3, *, bends: bool = False) -> None:
+        self.time, self.noise, self._bends = 0.0, noise, bends
+        self._gone = np.zeros(2)
         self.mean, self.covariance = np.zeros(size), np.zeros((size, size))
         self.mean[:3], self.covariance[:3, :3] = start.mean, start.covariance
         self.fit: dict[int, float] = {}  # log-likelihood of each pulse used, by number
@@ -46,7 +49,10 @@ class Follower(ABC):
         """
         if not time >= self.time:
             raise ParameterError(f"time {time} s must not come before {self.time} s")
-        advance(self.mean, self.covariance, 0, speed, yaw_rate, time - self.time, *self.noise)
+        duration, heading = time - self.time, self.mean[2]
+        if self._bends:
+            bend(self.covariance, 0, self._gone, heading, speed, duration)
+        advance(self.mean, self.covariance, 0, speed, yaw_rate, duration, *self.noise)
         self.time = time
 
     @abstractmethod
@@ -67,6 +73,7 @@ class Follower(ABC):
         if result[-1] != loops.OK:
             return  # what cannot be used changes nothing
         self.mean, self.covariance = result[0], result[1]
+        self._gone[:] = 0.0
         if number is not None:
             self.fit[number] = -0.5 * (result[4] + float(np.linalg.slogdet(result[3])[1]))
 

@@ -111,3 +111,18 @@ def odometry_covariance(heading, speed, duration, speed_density, yaw_density):
     Q[1, 2] = Q[2, 1] = skew * c
     Q[2, 2] = yaw_density * duration
     return Q
+
+
+@compiled
+def bend(P, at, gone, heading, speed, duration):
+    """Variance of a position that a heading error costs in second order, along the course; `gone` (2,) adds it up.
+
+    A heading off by d loses speed (1 - cos d), all the way in the same direction: of a Gaussian d of variance p in the
+    root mean square sqrt(3) / 2 p to second order, and never more than twice the speed.
+    """
+    lost = duration * speed * min(0.5 * math.sqrt(3.0) * P[at + 2, at + 2], 1.25)
+    more = np.array([lost * math.cos(heading), lost * math.sin(heading)])
+    for i in range(2):
+        for j in range(2):
+            P[at + i, at + j] += (gone[i] + more[i]) * (gone[j] + more[j]) - gone[i] * gone[j]
+    gone += more

@@ -48,6 +48,7 @@ class Sight(NamedTuple):
     by_follower: Array  # (m, 3) derivative by the follower's pose
     by_leader: Array  # (m, 2) derivative by the leader's position
     covariance: Array  # (m, m) of the noise
+    away: Array  # (2,) from the follower to the leader [m]
 
 
 def seen(pulse: Pulse, follower: Array, leader: Array) -> Sight | None:
@@ -56,9 +57,27 @@ def seen(pulse: Pulse, follower: Array, leader: Array) -> Sight | None:
     if values[0] == 0.0:
         return None
     has_range, has_bearing = math.isfinite(pulse.range), math.isfinite(pulse.bearing)
-    rows = slice(0 if has_range else 1, 2 if has_bearing else 1)
+    rows = _rows(pulse)
     residual = np.array([pulse.range - values[0], wrap(pulse.bearing - values[1])])[rows]
     by_follower = D[rows] * np.array([-1.0, -1.0, 1.0])
-    return Sight(
-        residual, by_follower, D[rows, :2].copy(), np.diag([pulse.range_variance, pulse.bearing_variance][rows])
-    )
+    R = np.diag([pulse.range_variance, pulse.bearing_variance][rows])
+    return Sight(residual, by_follower, D[rows, :2].copy(), R, leader[:2] - follower[:2])
+
+
+def curved(found: Sight, pulse: Pulse, spread: Array) -> Sight:
+    """The same to second order (Bar-Shalom, Li, Kirubarajan 2001, 10.3.2), which a follower needs that is far off.
+
+    Args:
+        spread: Covariance (2, 2) of the vector from the follower to the leader.
+    """
+    r = math.hypot(*found.away)
+    u = found.away / r
+    n = np.array([-u[1], u[0]])
+    across, along, skew = n @ spread @ n, u @ spread @ u, u @ spread @ n
+    shift = np.array([0.5 * across / r, -skew / r**2])[_rows(pulse)]
+    more = np.array([0.5 * (across / r) ** 2, (along * across + skew**2) / r**4])[_rows(pulse)]
+    return found._replace(residual=found.residual - shift, covariance=found.covariance + np.diag(more))
+
+
+def _rows(pulse: Pulse) -> slice:
+    return slice(0 if math.isfinite(pulse.range) else 1, 2 if math.isfinite(pulse.bearing) else 1)

@@ -9,7 +9,7 @@ from estimators.path_prediction.kinematics import sight
 
 
 class Observability(NamedTuple):
-    """Of initial north, east [m], heading [rad] and mean yaw rate [rad/s], from ranges alone, without noise of motion."""
+    """Of initial north, east [m], heading [rad] and mean yaw rate [rad/s], from ranges alone, motion without noise."""
 
     rank: int
     deviations: Array  # (4,) what the states are known to; infinite where they are not observable

@@ -12,7 +12,7 @@ from estimators.core.loops import wrap
 from estimators.core.types import Array, Gaussian
 from estimators.path_prediction.follower import Follower
 from estimators.path_prediction.kinematics import advance, clone, odometry_covariance, replace, transport
-from estimators.path_prediction.messages import Noise, Packet, Pulse, seen
+from estimators.path_prediction.messages import Noise, Packet, Pulse, curved, seen
 
 ERROR, SLOTS = 3, 6  # places of the leader's error and of the first of its poses
 EXACT = 1e-6 * np.eye(3)  # a packet says what the leader's estimate was, not where it was
@@ -41,7 +41,7 @@ class RealTimeFilter(Follower):
         slots: int = 10,
         manoeuvre: float = math.radians(0.5),
     ) -> None:
-        super().__init__(start, noise, SLOTS + 3 * slots)
+        super().__init__(start, noise, SLOTS + 3 * slots, bends=True)
         self._leader_noise, self._period, self._manoeuvre = leader_noise, period, manoeuvre
         self._numbers = [-1] * slots
         self._newest = -1  # number of the newest slot
@@ -70,9 +70,11 @@ class RealTimeFilter(Follower):
         place = self.mean[at : at + 2] - back @ self.mean[ERROR : ERROR + 3]
         if (found := seen(pulse, self.mean, place)) is None:
             return
-        H = np.zeros((found.residual.size, self.mean.size))
-        H[:, :3], H[:, at : at + 2] = found.by_follower, found.by_leader
-        H[:, ERROR : ERROR + 3] = -found.by_leader @ back
+        J = np.zeros((2, self.mean.size))  # of the vector from the follower to the leader
+        J[:, :2], J[:, at : at + 2], J[:, ERROR : ERROR + 3] = -np.eye(2), np.eye(2), -back
+        found = curved(found, pulse, J @ self.covariance @ J.T)
+        H = found.by_leader @ J
+        H[:, 2] = found.by_follower[:, 2]
         self.correct(H, found.residual, found.covariance, pulse.number)
 
     def receive(self, packet: Packet) -> None:

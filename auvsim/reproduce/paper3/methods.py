@@ -26,7 +26,7 @@ class Method:
 
 def dead_reckoning(run: Run) -> Follower:
     """Of the follower's odometry."""
-    return DeadReckoning(run.start, run.noise.follower)
+    return DeadReckoning(run.start, run.noise.follower, bends=True)
 
 
 def delay_ignoring(run: Run, **options: Any) -> Follower:

@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -214,7 +215,7 @@ def _pulse(
 def _grown(known: Array, own: Array, q: Noise) -> Array:
     """The leader's own covariance, moved on along its dead reckoning."""
     P = known.copy()
-    for before, after in zip(own[:-1], own[1:], strict=True):
+    for before, after in pairwise(own):
         transport(P, 0, *(after - before)[:2])
         c, s = math.cos(before[2]), math.sin(before[2])
         P[:2, :2] += STEP * q.speed * np.array([[c * c, c * s], [c * s, s * s]])
