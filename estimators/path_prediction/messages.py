@@ -56,7 +56,6 @@ def seen(pulse: Pulse, follower: Array, leader: Array) -> Sight | None:
     values, D = sight(leader[0] - follower[0], leader[1] - follower[1], follower[2])
     if values[0] == 0.0:
         return None
-    has_range, has_bearing = math.isfinite(pulse.range), math.isfinite(pulse.bearing)
     rows = _rows(pulse)
     residual = np.array([pulse.range - values[0], wrap(pulse.bearing - values[1])])[rows]
     by_follower = D[rows] * np.array([-1.0, -1.0, 1.0])
