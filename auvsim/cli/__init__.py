@@ -134,8 +134,9 @@ class Reproduce:
     gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019)."""
+    paper: Annotated[Literal["paper1", "paper3"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019). paper3: cooperative localisation with late packets (Yao
+    et al. 2011); truth planar."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0
