@@ -41,6 +41,16 @@ class ChoosingFilter(Follower):
         return 1.0 / (1.0 + math.exp(-min(max(odds, -SATURATED), SATURATED)))
 
     @property
+    def belief(self) -> Gaussian:
+        """Mean and covariance of the mixture."""
+        beliefs: list[Gaussian] = [member.belief for member in self.members]
+        weights = (w := self.weight, 1.0 - w)
+        mean = sum((w * b.mean for w, b in zip(weights, beliefs, strict=True)), np.zeros(3))
+        spread = [b.mean - mean for b in beliefs]
+        parts = (w * (b.covariance + np.outer(d, d)) for w, b, d in zip(weights, beliefs, spread, strict=True))
+        return Gaussian(mean=mean, covariance=sum(parts, np.zeros((3, 3))))
+
+    @property
     def leader(self) -> tuple[float, Array] | None:
         """As the weightier member has it."""
         return self.members[self.weight < 0.5].leader
@@ -50,7 +60,6 @@ class ChoosingFilter(Follower):
         for member in self.members:
             member.advance(time, speed, yaw_rate)
         self.time = time
-        self._mix()
 
     def hear(self, pulse: Pulse) -> None:
         """Both."""
@@ -70,13 +79,3 @@ class ChoosingFilter(Follower):
         for number in sorted(one.keys() & other.keys()):
             self._evidence = FADING * self._evidence + one.pop(number) - other.pop(number)
             self.fit[number] = 0.0
-        self._mix()
-
-    def _mix(self) -> None:
-        """Mean and covariance of the mixture."""
-        beliefs: list[Gaussian] = [member.belief for member in self.members]
-        weights = (w := self.weight, 1.0 - w)
-        self.mean = sum((w * b.mean for w, b in zip(weights, beliefs, strict=True)), np.zeros(3))
-        spread = [b.mean - self.mean for b in beliefs]
-        parts = (w * (b.covariance + np.outer(d, d)) for w, b, d in zip(weights, beliefs, spread, strict=True))
-        self.covariance = sum(parts, np.zeros((3, 3)))

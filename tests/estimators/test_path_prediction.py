@@ -426,11 +426,11 @@ def test_choice_goes_to_the_member_that_foretells_the_pulses():
         both._judge()
     assert both.weight > 0.99
     both.members[0].mean[:2] += 10.0
-    both._mix()
+    found = both.belief
     w, apart = both.weight, both.members[0].mean[:3] - both.members[1].mean[:3]
-    np.testing.assert_allclose(both.mean, both.members[1].mean[:3] + w * apart)
+    np.testing.assert_allclose(found.mean, both.members[1].mean[:3] + w * apart)
     mixed = w * both.members[0].covariance[:3, :3] + (1.0 - w) * both.members[1].covariance[:3, :3]
-    np.testing.assert_allclose(both.covariance, mixed + w * (1.0 - w) * np.outer(apart, apart), atol=1e-12)
+    np.testing.assert_allclose(found.covariance, mixed + w * (1.0 - w) * np.outer(apart, apart), atol=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def verdicts(study: Study) -> list[Verdict]:
 def _order(study: Study) -> Iterator[Verdict]:
     if (results := study.results.get(POOLED)) is None:
         return
-    for one, other in zip(ORDER[:-1], ORDER[1:], strict=True):
+    for one, other in pairwise(ORDER):
         value, low, _ = ratio(results[one], results[other])
         yield _verdict(POOLED, f"{one} / {other}", value, 1.0, math.inf, value - low)
     value, low, _ = ratio(results["ekf"], results["iiru"])
@@ -48,9 +49,8 @@ def _fine(study: Study) -> Iterator[Verdict]:
 
 
 def _loss(study: Study) -> Iterator[Verdict]:
-    lost, whole = (study.results.get(f"loss_fine_{loss}") for loss in ("60%", "0%"))
-    if lost is not None and whole is not None:
-        value, low, _ = ratio(lost["sc"], whole["sc"])
+    if {"loss_fine_60%", "loss_fine_0%"} <= study.results.keys():
+        value, low, _ = ratio(study.results["loss_fine_60%"]["sc"], study.results["loss_fine_0%"]["sc"])
         yield _verdict("loss_fine_60%", "sc / sc without loss", value, 0.0, 1.1, value - low)
 
 

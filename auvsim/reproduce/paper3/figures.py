@@ -5,6 +5,7 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter, StrMethodFormatter
 
 from auvsim.analysis.style import dress
 from auvsim.reproduce.paper3.follow import SAMPLE, deliver
@@ -57,17 +58,18 @@ def timing(seed: int) -> Figure:
             arrived = event.received if is_packet else event.detected
             if not (low <= sent <= high and arrived <= high):
                 continue
-            colour, name = (COLOURS["iiru"], "packet") if is_packet else (COLOURS["ekf"], "pulse")
+            colour = COLOURS["iiru"] if is_packet else COLOURS["ekf"]
             axes.annotate("", (arrived, 0.0), (sent, 1.0), arrowprops={"arrowstyle": "->", "color": colour, "lw": 1.6})
+            low_text = -0.32 if is_packet else -0.12
             axes.text(
-                arrived, -0.12, f"{name[:2] if is_packet else 's'}{event.number}", color=colour, ha="center", va="top"
+                arrived, low_text, f"{'packet' if is_packet else 'pulse'} {event.number}", color=colour, ha="center"
             )
         axes.axhline(1.0, color="#444444", lw=1.0)
         axes.axhline(0.0, color="#444444", lw=1.0)
         axes.set_yticks([0.0, 1.0], ["follower", "leader"])
-        axes.set_ylim(-0.45, 1.25)
+        axes.set_ylim(-0.45, 1.2)
         axes.set_xlim(low, high)
-        dress(axes, f"{title}: s sound pulse heard, pa packet received, by number", "time [s]", "")
+        dress(axes, title, "time [s]", "")
     return figure
 
 
@@ -137,11 +139,15 @@ def delay(study: Study) -> Figure:
     for axes, title in ((accuracy, "leader steady"), (turning, "leader weaving, noisy odometry")):
         axes.axhline(1.1, color=BOUND, ls=":", label="10 % worse")
         axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(0.5, 0.7, 1.0, 1.5, 2.0, 3.0, 5.0)))
+        axes.yaxis.set_major_formatter(StrMethodFormatter("{x:g}"))
+        axes.yaxis.set_minor_formatter(NullFormatter())
         dress(axes, title, "delay of packets [s]", "rms over that of SC-RT")
     dress(cpu, "time of computing", "delay of packets [s]", "CPU for 1000 s [ms]")
     dress(memory, "memory", "delay of packets [s]", "state of the filter [kB]")
     for axes in (accuracy, turning, cpu, memory):
         axes.set_xscale("log")
+        axes.set_xticks((*DELAYS[::2], 60.0), [f"{d:g}" for d in (*DELAYS[::2], 60.0)])
     accuracy.legend(fontsize=9, frameon=False)
     return figure
 
@@ -206,7 +212,7 @@ def _track(key: str, run: Run, of_leader: bool = False) -> Array:
             n += 1
         method.advance((k + 1) * STEP, speed, yaw_rate)
         if not of_leader:
-            places.append(method.mean[:2].copy())
+            places.append(method.belief.mean[:2])
         elif (known := method.leader) is not None:
             places.append(known[1].copy())
     return np.array(places)

@@ -42,9 +42,10 @@ def _rows(method: Follower, run: Run) -> Iterator[tuple[float, Array, Array, Arr
         method.advance(end, speed, yaw_rate)
         if (k + 1) % every == 0:
             lead = np.full(2, np.nan)
-            if (known := method.leader) is not None:
-                lead = known[1] - at(run.leader, known[0])[:2]
-            yield end, method.mean[:2] - run.follower[k + 1, :2], method.covariance[:2, :2].copy(), lead
+            if (leader := method.leader) is not None:
+                lead = leader[1] - at(run.leader, leader[0])[:2]
+            known = method.belief
+            yield end, known.mean[:2] - run.follower[k + 1, :2], known.covariance[:2, :2], lead
 
 
 def deliver(method: Follower, event: Event) -> None:
