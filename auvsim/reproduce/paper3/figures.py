@@ -170,7 +170,8 @@ def loss(study: Study) -> Figure:
                 axes.plot(*zip(*points, strict=True), style, color=colour, label=METHODS[key].title)
         axes.set_ylim(bottom=0.0)
         dress(axes, title, "packets lost [%]", "rms error of the position [m]")
-        axes.legend(fontsize=9, frameon=False)
+        if axes.lines:
+            axes.legend(fontsize=9, frameon=False)
     return figure
 
 
