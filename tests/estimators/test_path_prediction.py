@@ -17,6 +17,7 @@ from estimators.path_prediction import kinematics
 from estimators.path_prediction.bound import Sighting, position_bounds
 from estimators.path_prediction.choosing import ChoosingFilter
 from estimators.path_prediction.cloning import CloningFilter, interpolated
+from estimators.path_prediction.delayed import DelayedFilter
 from estimators.path_prediction.follower import DeadReckoning
 from estimators.path_prediction.messages import Noise, Packet, Pulse, curved, seen
 from estimators.path_prediction.observability import observability
@@ -442,3 +443,38 @@ def test_rank_of_ranges(scene, rank, heading):
     leader, follower = truths.integrate(first_l, motion_l), truths.integrate(first_f, motion_f)
     found = observability(leader, follower, STEP, np.arange(0.0, 1000.0, 10.0), 226.0)
     assert (found.rank, found.heading_observable) == (rank, heading)
+
+
+def test_delayed_filter_goes_back_to_where_the_range_was_taken():
+    """A heading error turns all that was gone since; against a correction of the pose then, carried on by odometry."""
+    first = np.array([100.0, -40.0, 0.6])
+    P0 = np.diag([25.0, 16.0, 0.04])
+    method = DelayedFilter(Gaussian(mean=first, covariance=P0), Noise(0.0, 0.0))
+    method.hear(Pulse(0, 0.0, 0.0, 210.0, 9.0))
+    for second in range(1, 31):
+        method.advance(float(second), 3.0, 0.02)
+    method.receive(packet(0, [300.0, 30.0, 0.2], late=30.0))
+    prompt = CloningFilter(Gaussian(mean=first, covariance=P0), Noise(0.0, 0.0), bends=False)
+    prompt.hear(Pulse(0, 0.0, 0.0, 210.0, 9.0))
+    for second in range(1, 31):
+        prompt.advance(float(second), 3.0, 0.02)
+    prompt.receive(packet(0, [300.0, 30.0, 0.2], late=30.0))
+    np.testing.assert_allclose(method.mean, prompt.mean[:3], atol=1e-9)
+    np.testing.assert_allclose(method.covariance, prompt.covariance[:3, :3], atol=1e-9)
+
+
+def test_packet_predicted_to_the_frozen_leader():
+    """Eqs 20 and 21: in one Euler step, whose held inputs are wrong all the way."""
+    run = zero_noise("straight")
+    method = iiru(run)
+    first = packet(0, run.leader[0], yaw_rate=0.01)
+    method.advance(10.0, 3.0, 0.0)
+    method.receive(first)  # the leader's part begins where it is frozen, at 10 s
+    h, q = 10.0, run.noise.leader
+    F = np.array(
+        [[1.0, 0.0, -h * 3.0 * math.sin(first.pose[2])], [0.0, 1.0, h * 3.0 * math.cos(first.pose[2])], [0, 0, 1]]
+    )
+    G = np.array([[math.cos(first.pose[2]), 0.0], [math.sin(first.pose[2]), 0.0], [0.0, 1.0]])
+    expected = F @ START @ F.T + h**2 * G @ np.diag(q) @ G.T
+    np.testing.assert_allclose(method.covariance[3:6, 3:6], expected)
+    np.testing.assert_allclose(method.mean[5], first.pose[2] + 0.1)
