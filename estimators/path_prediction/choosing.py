@@ -30,7 +30,7 @@ class ChoosingFilter(Follower):
     """
 
     def __init__(self, cloning: CloningFilter, real_time: RealTimeFilter) -> None:
-        super().__init__(cloning.belief, cloning.noise)
+        self.time = cloning.time  # it has no joint belief of its own, only `belief`
         self.members = (cloning, real_time)
         self._evidence = 0.0  # fading sum of log-likelihood ratios
 
@@ -78,4 +78,3 @@ class ChoosingFilter(Follower):
         one, other = (member.fit for member in self.members)
         for number in sorted(one.keys() & other.keys()):
             self._evidence = FADING * self._evidence + one.pop(number) - other.pop(number)
-            self.fit[number] = 0.0

@@ -10,6 +10,8 @@ from estimators.core.types import Array, Gaussian
 from estimators.path_prediction.kinematics import advance, bend
 from estimators.path_prediction.messages import Noise, Packet, Pulse
 
+REMEMBERED = 100  # pulses of which the likelihood is kept
+
 
 class Follower(ABC):
     """An estimator of the pose of a vehicle with odometry that hears pulses and packets of a leader.
@@ -29,7 +31,7 @@ class Follower(ABC):
         self._gone = np.zeros(2)
         self.mean, self.covariance = np.zeros(size), np.zeros((size, size))
         self.mean[:3], self.covariance[:3, :3] = start.mean, start.covariance
-        self.fit: dict[int, float] = {}  # log-likelihood of each pulse used, by number
+        self.fit: dict[int, float] = {}  # log-likelihood of the last pulses used, by number
 
     @property
     def belief(self) -> Gaussian:
@@ -75,7 +77,13 @@ class Follower(ABC):
         self.mean, self.covariance = result[0], result[1]
         self._gone[:] = 0.0
         if number is not None:
-            self.fit[number] = -0.5 * (result[4] + float(np.linalg.slogdet(result[3])[1]))
+            self.note_fit(number, result[4], result[3])
+
+    def note_fit(self, number: int, nis: float, S: Array) -> None:
+        """Keeps the log-likelihood of a pulse by its normalised innovation squared and covariance S (m, m)."""
+        self.fit[number] = -0.5 * (nis + float(np.linalg.slogdet(S)[1]))
+        if len(self.fit) > REMEMBERED:
+            del self.fit[next(iter(self.fit))]
 
 
 class DeadReckoning(Follower):

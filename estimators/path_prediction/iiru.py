@@ -140,4 +140,4 @@ class IncoordinateIntervalFilter(Follower):
         if not self._coupled:
             P[:LEADER, LEADER:], P[LEADER:, :LEADER] = 0.0, 0.0
         self.covariance = 0.5 * (P + P.T)
-        self.fit[number] = -0.5 * float(found.residual @ np.linalg.solve(S, found.residual) + np.linalg.slogdet(S)[1])
+        self.note_fit(number, float(found.residual @ np.linalg.solve(S, found.residual)), S)
