@@ -160,8 +160,10 @@ class Reproduce:
     figures and tables of its own beside them. The same seed gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1", "paper2"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019); paper2: ranges to a leader in an unknown current."""
+    paper: Annotated[Literal["paper1", "paper2", "paper3"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019).
+    paper2: ranges to a leader in an unknown current.
+    paper3: cooperative localisation with late packets (Yao et al. 2011)."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0
