@@ -91,6 +91,13 @@ class Matcher:
         return kernels.products(*arguments)
 
     @cached_property
+    def noise_filtered(self) -> float:
+        """Standard deviation of the noise in a prepared frame."""
+        shape = tuple(2 * size for size in self.grid.shape)
+        response = np.fft.irfft2(self._transfer, shape)
+        return self.model.noise * float(np.sqrt(np.sum(response**2)))
+
+    @cached_property
     def _transfer(self) -> Array:
         """Transfer function of the filter on the frame padded to twice its size."""
         model, cell = self.model, self.grid.cell

@@ -17,7 +17,7 @@ from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Models
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Search, match
-from estimators.map_path.odometry import ERRORS, POSE, OdometryNoise
+from estimators.map_path.odometry import POSE, OdometryNoise
 from estimators.map_path.poses import between, between_jacobians
 
 NIS_GATE = 0.9999  # a match outside is refused
@@ -154,6 +154,3 @@ def _in_later_axes(earlier: Array, later: Array) -> tuple[Array, Array]:
     c, s = np.cos(turn), np.sin(turn)
     turned = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
     return turned @ by_earlier, turned @ by_later
-
-
-__all__ = ["ERRORS", "Window", "WindowFilter", "WindowState"]
