@@ -13,6 +13,8 @@ from estimators.map_path.frames import SectorGrid, SonarFrame, to_sector
 from estimators.map_path.poses import Input, compose, increments
 
 REACH = 3.0  # features up to this far outside the frame still shine into it [m]
+SATURATION = 50.0  # value at which the receiver saturates
+LATENESS = 1.5  # of late frames [s]
 GRID = SectorGrid()
 ARRAY = LineArray()
 
@@ -31,11 +33,12 @@ class Conditions:
     speed_noise: float = 0.1
     turn_rate_bias: float = math.radians(0.7)  # [rad/s]
     turn_rate_noise: float = math.radians(0.3)
+    bad_frames: float = 0.0  # share of frames that are empty, not finite, saturated, of a wrong size, missing or late
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class Run:
-    """One run: as many frames as poses, one interval of odometry less."""
+    """One run: a frame for each pose but the missing ones, and one interval of odometry less."""
 
     conditions: Conditions
     poses: Array  # (k, 3) true north, east [m], heading [rad]
@@ -69,11 +72,29 @@ def simulate(conditions: Conditions, seed: int) -> Run:
         SonarFrame(stamp=float(k), intensity=render(features, pose, conditions.snr, noise), geometry=GRID, sequence=k)
         for k, pose in enumerate(poses)
     )
+    if conditions.bad_frames:
+        frames = _spoiled(frames, conditions.bad_frames, stream(seed, 0, "paper5/bad_frames"))
     bias = odometry.uniform(-1.0, 1.0, 2) * (conditions.speed_bias, conditions.turn_rate_bias)
     white = odometry.uniform(-1.0, 1.0, (count, 2)) * (conditions.speed_noise, conditions.turn_rate_noise)
     shown = np.array([conditions.speed, conditions.turn_rate]) + bias + white
     inputs = tuple(Input(speed, turn_rate, 1.0) for speed, turn_rate in shown.tolist())
     return Run(conditions=conditions, poses=poses, inputs=inputs, frames=frames)
+
+
+def _spoiled(frames: tuple[SonarFrame, ...], share: float, rng: np.random.Generator) -> tuple[SonarFrame, ...]:
+    """The frames, each but the first with a probability of being bad in one of six ways."""
+    kept = [frames[0]]
+    for frame in frames[1:]:
+        draw, kind = rng.random(), int(rng.integers(6))
+        z = frame.intensity
+        if draw >= share:
+            kept.append(frame)
+        elif kind < 4:
+            spoiled = (np.zeros_like(z), np.full_like(z, np.nan), np.full_like(z, SATURATION) + 0.1 * z, z[:-1])[kind]
+            kept.append(replace(frame, intensity=spoiled))
+        elif kind == 4:
+            kept.append(replace(frame, received=frame.stamp + LATENESS))
+    return tuple(kept)
 
 
 def point_frame(features: Array, pose: Array, snr: float, rng: np.random.Generator, spread: float = 0.5) -> Array:
