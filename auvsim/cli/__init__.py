@@ -130,12 +130,14 @@ class Reproduce:
     """Reproduces the figures and tables of a paper.
 
     Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. The same seed
+    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png (paper 5: study.csv, acceptance.csv,
+    growth.csv, figure2.png, growth.png, sweeps.png and map.png). The same seed
     gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019)."""
+    paper: Annotated[Literal["paper1", "paper5"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019);
+    paper5: navigation by Bayes filtering of imaging sonar frames."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0

@@ -47,8 +47,8 @@ def optimise(
     *,
     fixes: Sequence[tuple[int, Array, Array]] = (),
     huber: float | None = 3.0,
-    iterations: int = 30,
-    tolerance: float = 1e-6,
+    iterations: int = 100,
+    tolerance: float = 1e-4,
 ) -> GraphSolution:
     """Poses that minimise the squares of the edges' normalised residuals.
 

@@ -1,8 +1,9 @@
 """How well two sonar frames agree on a relative pose: log-likelihood ratios, literal and mended (paper 5, sec. 3 and 4).
 
 Frames show point features of a Gaussian point spread in white noise. Taken as a Gaussian field of spectrum S in noise of
-variance s2, two frames of the same floor have the log-likelihood ratio sum over cells of Y(c) Y'(warped c), with Y the
-frame filtered by T, T^2 = S / (s2^2 + 2 S s2): a matched filter, weakened where features stand out of the noise anyhow.
+variance s2, a frame and k earlier ones of the same floor have the log-likelihood ratio sum over those and over cells of
+Y(c) Y'(warped c), with Y the frame filtered by T, T^2 = S / (s2^2 + (k + 1) S s2): a matched filter, weakened where
+features stand out of the noise anyhow.
 """
 
 from dataclasses import dataclass, replace
@@ -33,9 +34,12 @@ class FrameModel:
     noise: float = 1.0  # standard deviation of the noise in a cell, in the frames' unit
     weighting: Weighting = "field"  # the ratio above; "point" and "literal": the paper's, mended and as printed
     gain: float = 2.0  # of the weighting "point"
+    together: int = 1  # k, earlier frames that a frame is compared with at once
 
     def __post_init__(self) -> None:
-        if not (min(self.density, self.point_spread, self.noise, self.gain) > 0.0 and self.amplitude > 0.0):
+        if not (
+            min(self.density, self.point_spread, self.noise, self.gain) > 0.0 and min(self.amplitude, self.together) > 0
+        ):
             raise ParameterError(f"{self}: all numbers must be above 0")
 
     def scaled(self, snr: float) -> "FrameModel":
@@ -109,7 +113,7 @@ class Matcher:
         noise, density = model.noise**2, model.density * cell**2 * model.amplitude**2
         if model.weighting == "point":
             return spread * np.sqrt(model.gain * density / (noise**2 + 2.0 * noise * density * spread.max() ** 2))
-        return spread * np.sqrt(density / (noise**2 + 2.0 * noise * density * spread**2))
+        return spread * np.sqrt(density / (noise**2 + (model.together + 1.0) * noise * density * spread**2))
 
 
 def _upsampling(size: int) -> Array:

@@ -5,7 +5,7 @@ says where the vehicle is relative to them, so their errors and the vehicle's re
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -50,13 +50,15 @@ class WindowFilter:
     """Frame-to-window matching for a `History`; inputs are speed [m/s] and turn rate [rad/s].
 
     Args:
-        matcher: Compares two frames.
+        matcher: Of the frames' grid and model; that a frame is compared with several at once is seen to here.
         start: Belief of the pose (3) at the first node.
         noise: How odometry errs.
         window: Which frames to match against.
         search: Which poses to try.
         saturation: Value at which the receiver saturates.
     """
+
+    sensors: Models = {}
 
     def __init__(
         self,
@@ -69,8 +71,9 @@ class WindowFilter:
         saturation: float = np.inf,
     ) -> None:
         noise = noise or OdometryNoise()
-        self.matcher, self.process, self.sensors = matcher, noise.process(), _NO_MODELS
         self._start, self._window, self._search = noise.start(start), window or Window(), search or Search()
+        model = replace(matcher.model, together=len(self._window.lags))
+        self.matcher, self.process = Matcher(matcher.grid, model), noise.process()
         self._saturation = saturation
 
     def start(self, nodes: Sequence[Node[WindowState]], index: int) -> WindowState:
@@ -142,9 +145,6 @@ class WindowFilter:
             frames, rows = frames[1:], np.concatenate((rows[:5], rows[8:]))
         whole = Gaussian(mean=state.whole.mean[rows], covariance=state.whole.covariance[np.ix_(rows, rows)])
         return state._replace(whole=whole, frames=frames)
-
-
-_NO_MODELS: Models = {}
 
 
 def _in_later_axes(earlier: Array, later: Array) -> tuple[Array, Array]:

@@ -101,8 +101,7 @@ def graph(run: Run) -> Track:
     frames = {round(f.stamp): matcher.prepare(f.intensity) for f in run.frames}
     ready = [frames.get(k) for k in range(len(run.poses))]
     solved = pose_graph.solve(matcher, ready, first.poses, START, close_loops=False).solution
-    covariances = first.covariances.copy()
-    covariances[:] = math.nan
+    covariances = np.full_like(first.covariances, math.nan)
     covariances[-1] = solved.covariance(-1)
     seconds = first.seconds + time.process_time() - begin
     return Track(poses=solved.poses, covariances=covariances, refused=first.refused, seconds=seconds)
