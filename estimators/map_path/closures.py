@@ -71,16 +71,20 @@ def largest_clique(agree: np.ndarray) -> list[int]:
 
 def _path(poses: Array, first: int, last: int, origin: Array, end: Array, drift: Array) -> Array:
     """Covariance of a stretch of the path, which begins at `origin` of the cycle, seen at the cycle's `end`."""
-    step = 1 if last >= first else -1
-    total = np.zeros((3, 3))
-    for k in range(first, last, step):
-        place = compose(origin, between(poses[first], poses[k + step]))
-        total += _carried(place, end, drift)
-    return total
+    if first == last:
+        return np.zeros((3, 3))
+    step = 1 if last > first else -1
+    stretch = poses[np.arange(first + step, last + step, step)]
+    return _carried(compose(origin, between(poses[first], stretch)), end, drift).sum(axis=0)
 
 
-def _carried(place: Array, end: Array, covariance: Array) -> Array:
-    """Covariance (3, 3), of a pose in its own axes, as that of the end of the cycle: a turn there swings the end."""
-    c, s = np.cos(place[2]), np.sin(place[2])
-    F = np.array([[c, -s, -(end[1] - place[1])], [s, c, end[0] - place[0]], [0.0, 0.0, 1.0]])
-    return F @ covariance @ F.T
+def _carried(places: Array, end: Array, covariance: Array) -> Array:
+    """Covariances (..., 3, 3), of poses (..., 3) in their own axes, as those of the end of the cycle.
+
+    A turn at a pose swings the end about it.
+    """
+    c, s = np.cos(places[..., 2]), np.sin(places[..., 2])
+    F = np.zeros((*places.shape, 3))
+    F[..., 0, 0], F[..., 0, 1], F[..., 1, 0], F[..., 1, 1], F[..., 2, 2] = c, -s, s, c, 1.0
+    F[..., 0, 2], F[..., 1, 2] = places[..., 1] - end[1], end[0] - places[..., 0]
+    return F @ covariance @ np.swapaxes(F, -1, -2)

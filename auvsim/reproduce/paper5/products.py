@@ -30,7 +30,6 @@ SWEEPS = {
     "SNR [dB]": {-6.0: "snr_-6", 0.0: "arc", 6.0: "snr_6", 12.0: "snr_12"},
     "density [1/m$^2$]": {0.02: "density_0.02", 0.05: "density_0.05", 0.1: "arc", 0.2: "density_0.2"},
 }
-PEAK_HEIGHT = 4.0  # of the map of the bound, in standard deviations of the image: brighter features are cut
 
 
 def write(study: Study, folder: Path) -> list[Path]:
@@ -109,8 +108,9 @@ def growth_figure(study: Study) -> Figure:
         style = {"ls": ":" if known else "-", "lw": 1.6, "color": None if known else COLOURS[_method(name)]}
         axes.loglog(range(1, len(errors)), errors[1:], label=f"{name}: $t^{{{growth_exponent(errors):.1f}}}$", **style)
     axes.set(xlim=(1, len(study.inertial) - 1), ylim=(1e-2, None))
-    dress(axes, f"{study.runs['drift']} runs of 240 s; exponents from 30 s on", "time [s]", "rms position error [m]")
-    finish(figure, axes, "How errors grow")
+    title = f"How errors grow: runs of 240 s ({study.runs['drift']}), exponents from 30 s on"
+    dress(axes, title, "time [s]", "rms position error [m]")
+    axes.legend(loc="upper left", fontsize=9.0)
     return figure
 
 
@@ -152,7 +152,7 @@ def map_figure(study: Study) -> Figure:
     poses = tracks["window"].poses
     left.plot(poses[:, 1], poses[:, 0], color="white", lw=1.4, label="path, frame to window")
     left.plot(run.poses[::10, 1], run.poses[::10, 0], "^", color="#7fdbff", ms=6, label="truth every 10 s")
-    left.legend(loc="lower left", fontsize=9.0)
+    left.legend(loc="upper left", fontsize=9.0, facecolor="#555555", labelcolor="white")
     dress(left, "Feature map of the first arc, 0 dB", "east [m]", "north [m]")
     raw = feature_map([by_stamp[k].intensity for k in range(len(run.poses))], poses, GRID)
     # What is left of the noise in a mean of n frames would pass for features.

@@ -59,12 +59,18 @@ def dead_reckoned(start: Array, inputs: tuple[Input, ...]) -> Array:
     return np.array(poses)
 
 
-def simulate(conditions: Conditions, seed: int) -> Run:
-    """The run of a seed; features, noise and odometry have streams of their own, so that runs are paired."""
+def simulate(conditions: Conditions, seed: int, motion: tuple[Input, ...] | None = None) -> Run:
+    """The run of a seed; features, noise and odometry have streams of their own, so that runs are paired.
+
+    Args:
+        conditions: What it is made of.
+        seed: Of every random number.
+        motion: The true motion in steps of 1 s, instead of the conditions' straight course or arc.
+    """
     place, noise, odometry = (stream(seed, 0, f"paper5/{name}") for name in ("features", "noise", "odometry"))
     heading = place.uniform(-math.pi, math.pi)
-    count = conditions.duration
-    poses = dead_reckoned(np.array([0.0, 0.0, heading]), (Input(conditions.speed, conditions.turn_rate, 1.0),) * count)
+    motion = motion or (Input(conditions.speed, conditions.turn_rate, 1.0),) * conditions.duration
+    poses = dead_reckoned(np.array([0.0, 0.0, heading]), motion)
     low, high = poses[:, :2].min(axis=0) - 25.0, poses[:, :2].max(axis=0) + 25.0
     features = place.uniform(low, high, (place.poisson(conditions.density * np.prod(high - low)), 2))
     render = _array_frame if conditions.frames == "array" else point_frame
@@ -75,8 +81,8 @@ def simulate(conditions: Conditions, seed: int) -> Run:
     if conditions.bad_frames:
         frames = _spoiled(frames, conditions.bad_frames, stream(seed, 0, "paper5/bad_frames"))
     bias = odometry.uniform(-1.0, 1.0, 2) * (conditions.speed_bias, conditions.turn_rate_bias)
-    white = odometry.uniform(-1.0, 1.0, (count, 2)) * (conditions.speed_noise, conditions.turn_rate_noise)
-    shown = np.array([conditions.speed, conditions.turn_rate]) + bias + white
+    white = odometry.uniform(-1.0, 1.0, (len(motion), 2)) * (conditions.speed_noise, conditions.turn_rate_noise)
+    shown = np.array(motion)[:, :2] + bias + white
     inputs = tuple(Input(speed, turn_rate, 1.0) for speed, turn_rate in shown.tolist())
     return Run(conditions=conditions, poses=poses, inputs=inputs, frames=frames)
 
