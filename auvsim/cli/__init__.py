@@ -130,9 +130,9 @@ class Reproduce:
     """Reproduces the figures and tables of a paper.
 
     Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png (paper 5: study.csv, acceptance.csv,
-    growth.csv, figure2.png, growth.png, sweeps.png and map.png). The same seed
-    gives the same numbers, on however many cores.
+    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png. Paper 5 writes
+    study.csv, acceptance.csv, growth.csv, figure2.png, growth.png, sweeps.png and map.png instead. The same seed gives
+    the same numbers, on however many cores.
     """
 
     paper: Annotated[Literal["paper1", "paper5"], tyro.conf.Positional]

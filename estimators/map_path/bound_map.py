@@ -1,8 +1,9 @@
 """Where matching will hold, before the mission: the Cramér-Rao bound of a match, cell by cell of a floor.
 
 Two frames of the same floor, each with white noise of variance s2 in a cell, tell their offset with the information
-J = sum over the cells both see of grad z grad z' / (2 s2). A frame of unknown heading shows, of a height field, its slope
-along the line of sight (Lambert's echo to first order); over all directions grad z grad z' has the mean g^2 Hess^2 / 2.
+J = sum over the cells both see of grad z grad z' / (2 s2). A frame of unknown heading shows, of a height field, its
+slope along the line of sight (Lambert's echo to first order); over all directions the mean of grad z grad z' is
+g^2 Hess^2 / 2.
 """
 
 import numpy as np
@@ -22,7 +23,8 @@ def image_information(image: Array, cell: float, spread: float) -> Array:
         spread: Standard deviation of the sonar's point spread [m]; 0 if it is in the image.
     """
     smooth = gaussian_filter(np.asarray(image, dtype=float), spread / cell) if spread > 0.0 else image
-    gradient = np.stack(np.gradient(smooth, cell), axis=-1)
+    north, east = np.gradient(smooth, cell)
+    gradient = np.stack((north, east), axis=-1)
     return gradient[..., :, None] * gradient[..., None, :]
 
 
@@ -30,7 +32,8 @@ def height_information(height: Array, cell: float, spread: float, gain: float) -
     """As `image_information`, of a height field [m]; `gain` is the echo's change [unit] for a slope of 1."""
     smooth = gaussian_filter(np.asarray(height, dtype=float), spread / cell) if spread > 0.0 else height
     north, east = np.gradient(smooth, cell)
-    hessian = np.stack((np.stack(np.gradient(north, cell), -1), np.stack(np.gradient(east, cell), -1)), axis=-2)
+    rows = [np.stack(tuple(np.gradient(slope, cell)), axis=-1) for slope in (north, east)]
+    hessian = np.stack(rows, axis=-2)
     hessian = 0.5 * (hessian + np.swapaxes(hessian, -1, -2))
     return 0.5 * gain**2 * hessian @ hessian
 

@@ -109,7 +109,7 @@ class PathFilter:
 
     def predict(self, state: PathState, u: Input, duration: float) -> PathState:
         """State after `duration` [s]: odometry is kept until a frame says how wrong it was."""
-        return state._replace(motion=(*state.motion, poses.Input(*u, duration)), verdicts=())
+        return state._replace(motion=(*state.motion, poses.Input(u[0], u[1], duration)), verdicts=())
 
     def correct(self, state: PathState, node_time: float, measurements: Sequence[Measurement]) -> PathState:
         """State after a node's frames; those that cannot be used are refused by name."""

@@ -41,7 +41,7 @@ class SectorGrid:
         rows, columns = self.shape
         forward = self.cell * (np.arange(rows) + 0.5)
         starboard = self.cell * (np.arange(columns) + 0.5 - columns / 2)
-        return np.stack(np.meshgrid(forward, starboard, indexing="ij"), axis=2)
+        return np.stack(np.meshgrid(forward, starboard, indexing="ij"), axis=2).astype(np.float64)
 
     @cached_property
     def seen(self) -> np.ndarray:

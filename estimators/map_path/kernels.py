@@ -1,4 +1,4 @@
-"""Compiled loops of map matching: products of two frames over a fixed set of cells, and the max-plus step of a trellis."""
+"""Compiled loops: products of two frames over a fixed set of cells, and the max-plus step of a trellis."""
 
 import math
 
@@ -8,53 +8,48 @@ from estimators.core.compiling import compiled
 
 
 @compiled
+def _bilinear(image, row, column):
+    """Value between four samples; NaN outside."""
+    i, j = math.floor(row), math.floor(column)
+    if not (0 <= i < image.shape[0] - 1 and 0 <= j < image.shape[1] - 1):
+        return math.nan
+    a, b = row - i, column - j
+    near = image[i, j] + b * (image[i, j + 1] - image[i, j])
+    far = image[i + 1, j] + b * (image[i + 1, j + 1] - image[i + 1, j])
+    return near + a * (far - near)
+
+
+@compiled
 def products(values, places, fine, scale, origin_row, origin_column, poses):
     """Sums (k,) of `values` (n,) times an upsampled earlier frame at the cells' places seen from relative poses (k, 3).
 
     `places` (n, 2) [m] are seen from the later frame; `fine` (rows, columns) has `scale` samples a metre, its sample
     (0, 0) at `origin_row`, `origin_column` [m]. Outside it the earlier frame is 0. Bilinear.
     """
-    rows, columns = fine.shape
     sums = np.zeros(poses.shape[0])
     for k in range(poses.shape[0]):
         c, s = math.cos(poses[k, 2]) * scale, math.sin(poses[k, 2]) * scale
-        first = (poses[k, 0] - origin_row) * scale
-        second = (poses[k, 1] - origin_column) * scale
-        total = 0.0
+        first, second = (poses[k, 0] - origin_row) * scale, (poses[k, 1] - origin_column) * scale
         for n in range(values.size):
             row = first + c * places[n, 0] - s * places[n, 1]
-            column = second + s * places[n, 0] + c * places[n, 1]
-            i, j = int(math.floor(row)), int(math.floor(column))
-            if 0 <= i < rows - 1 and 0 <= j < columns - 1:
-                a, b = row - i, column - j
-                near = fine[i, j] + b * (fine[i, j + 1] - fine[i, j])
-                far = fine[i + 1, j] + b * (fine[i + 1, j + 1] - fine[i + 1, j])
-                total += values[n] * (near + a * (far - near))
-        sums[k] = total
+            seen = _bilinear(fine, row, second + s * places[n, 0] + c * places[n, 1])
+            if seen == seen:
+                sums[k] += values[n] * seen
     return sums
 
 
 @compiled
 def square_differences(values, places, fine, scale, origin_row, origin_column, poses):
     """As `products`, of squares of the differences instead (paper 5, eq. 4), over the cells that both frames have."""
-    rows, columns = fine.shape
     sums = np.zeros(poses.shape[0])
     for k in range(poses.shape[0]):
         c, s = math.cos(poses[k, 2]) * scale, math.sin(poses[k, 2]) * scale
-        first = (poses[k, 0] - origin_row) * scale
-        second = (poses[k, 1] - origin_column) * scale
-        total = 0.0
+        first, second = (poses[k, 0] - origin_row) * scale, (poses[k, 1] - origin_column) * scale
         for n in range(values.size):
             row = first + c * places[n, 0] - s * places[n, 1]
-            column = second + s * places[n, 0] + c * places[n, 1]
-            i, j = int(math.floor(row)), int(math.floor(column))
-            if 0 <= i < rows - 1 and 0 <= j < columns - 1:
-                a, b = row - i, column - j
-                near = fine[i, j] + b * (fine[i, j + 1] - fine[i, j])
-                far = fine[i + 1, j] + b * (fine[i + 1, j + 1] - fine[i + 1, j])
-                difference = values[n] - (near + a * (far - near))
-                total += difference * difference
-        sums[k] = total
+            seen = _bilinear(fine, row, second + s * places[n, 0] + c * places[n, 1])
+            if seen == seen:
+                sums[k] += (values[n] - seen) ** 2
     return sums
 
 

@@ -55,8 +55,6 @@ class LandmarkFilter:
         saturation: Value at which the receiver saturates.
     """
 
-    sensors: Models = {}
-
     def __init__(
         self,
         matcher: Matcher,
@@ -68,6 +66,7 @@ class LandmarkFilter:
     ) -> None:
         noise = noise or OdometryNoise()
         self.matcher, self.process, self._detection = matcher, noise.process(), detection or Detection()
+        self.sensors: Models = {}
         self._start, self._saturation = noise.start(start), saturation
 
     def start(self, nodes: Sequence[Node[LandmarkState]], index: int) -> LandmarkState:

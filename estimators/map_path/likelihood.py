@@ -1,8 +1,8 @@
-"""How well two sonar frames agree on a relative pose: log-likelihood ratios, literal and mended (paper 5, sec. 3 and 4).
+"""How well two sonar frames agree on a relative pose: log-likelihood ratios, as printed in paper 5 and mended.
 
-Frames show point features of a Gaussian point spread in white noise. Taken as a Gaussian field of spectrum S in noise of
-variance s2, a frame and k earlier ones of the same floor have the log-likelihood ratio sum over those and over cells of
-Y(c) Y'(warped c), with Y the frame filtered by T, T^2 = S / (s2^2 + (k + 1) S s2): a matched filter, weakened where
+Frames show point features of a Gaussian point spread in white noise. Taken as a Gaussian field of spectrum S in noise
+of variance s2, a frame and k earlier ones of the same floor have the log-likelihood ratio sum over those and over cells
+of Y(c) Y'(warped c), with Y the frame filtered by T, T^2 = S / (s2^2 + (k + 1) S s2): a matched filter, weakened where
 features stand out of the noise anyhow.
 """
 

@@ -1,4 +1,4 @@
-"""Where a frame lies relative to one or several earlier ones: the best pose near a predicted one, and its information."""
+"""Where a frame lies relative to earlier ones: the best pose near a predicted one, and its covariance."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -48,12 +48,13 @@ def match(
     """
     cells = [matcher.shared_cells(relative) for relative in relatives]
     counts = np.array([np.count_nonzero(shared) for shared in cells])
-    used = np.flatnonzero(counts >= LEAST_CELLS)
-    if not used.size:
+    used = np.flatnonzero(counts >= LEAST_CELLS).tolist()
+    if not used:
         return NO_OVERLAP
 
     def likelihood(offsets: Array) -> Array:
-        return sum(matcher.log_likelihood(later, earlier[k], compose(relatives[k], offsets), cells[k]) for k in used)  # pyright: ignore[reportReturnType]
+        each = [matcher.log_likelihood(later, earlier[k], compose(relatives[k], offsets), cells[k]) for k in used]
+        return np.sum(each, axis=0)
 
     information = np.linalg.inv(prior)
     offsets = _lattice(prior, search)
@@ -68,7 +69,7 @@ def match(
             return NO_PEAK
         peak, centre = centre + np.linalg.solve(curvature, gradient), best
     weights = np.where(counts >= LEAST_CELLS, counts, 0) / counts[used].sum()
-    return Match(peak, np.linalg.inv(curvature), float(value), weights)
+    return Match(peak, np.asarray(np.linalg.inv(curvature), dtype=np.float64), float(value), weights)
 
 
 def _lattice(prior: Array, search: Search) -> Array:

@@ -29,6 +29,16 @@ class _WithHistory(ProcessModel):
         self.process = noise.process()
         self.angles = (*self.process.angles, *range(7, 5 + 3 * KEPT, 3))
 
+    def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
+        """State after `dt` [s]."""
+        return self.move(x[None], u, dt)[0]
+
+    def jacobian(self, x: Array, u: Sequence[float], dt: float) -> Array:
+        """Derivative of `evaluate`."""
+        F = np.eye(x.size)
+        F[:5, :5] = self.process.jacobian(x[:5], u, dt)
+        return F
+
     def covariance(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """Of the five states only."""
         Q = np.zeros((x.size, x.size))
@@ -69,8 +79,6 @@ class ParticlePathFilter:
         seed: Of the particles.
     """
 
-    sensors: Models = {}
-
     def __init__(
         self,
         matcher: Matcher,
@@ -87,6 +95,7 @@ class ParticlePathFilter:
         self._first, self._saturation = noise.start(start), saturation
         self._particles = ParticleFilter(_WithHistory(noise), {}, self._drawn, seed=seed)
         self._process = noise.process()
+        self.sensors: Models = {}
 
     def start(self, nodes: Sequence[Node[ParticlePathState]], index: int) -> ParticlePathState:
         """Particles about the known start, with the node's frame as the first."""

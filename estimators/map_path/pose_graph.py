@@ -21,6 +21,7 @@ class GraphSettings:
     lags: tuple[int, ...] = (1, 2, 4, 8)  # frames apart that are matched
     chain: tuple[float, float, float] = (0.2, 0.2, np.radians(0.6))  # of the path given from frame to frame, deviations
     drift: tuple[float, float, float] = (0.05, 0.05, np.radians(0.08))  # what such a path gathers a frame, deviations
+    match_prior: tuple[float, float, float] = (0.1, 0.1, np.radians(0.5))  # added to that where a match is searched
     search: Search = Search(limits=(0.75, 0.75, np.radians(4.0)))  # noqa: RUF009 - immutable
     closure_search: Search = Search(limits=(4.0, 4.0, np.radians(5.0)))  # noqa: RUF009
     closure_gap: int = 40  # frames between the two of a closure at least
@@ -87,7 +88,7 @@ def _neighbours(
 ) -> list[Edge]:
     """Edges of frames that are some frames apart, searched about what the path says."""
     edges = []
-    prior = np.diag(np.square(settings.drift)) * lag + np.diag(np.square((0.1, 0.1, np.radians(0.5))))
+    prior = np.diag(np.square(settings.drift) * lag + np.square(settings.match_prior))
     for k in range(lag, len(path)):
         earlier, later = frames[k - lag], frames[k]
         if earlier is None or later is None:
@@ -124,7 +125,7 @@ def _candidates(
         if not support:
             continue
         gathered = np.square(settings.drift) * (k - nearest)
-        prior = np.diag(gathered + (0.1, 0.1, 1e-4))
+        prior = np.diag(gathered + np.array(settings.match_prior) ** 2)
         relatives = between(poses[support], poses[k])
         earlier = [frames[j] for j in support]
         got = match(matcher, later, earlier, relatives, prior, settings.closure_search)  # pyright: ignore

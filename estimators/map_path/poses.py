@@ -1,4 +1,4 @@
-"""Poses in the plane: north, east [m] and heading [rad] as arrays (..., 3); composition and what odometry makes of them.
+"""Poses in the plane as arrays (..., 3): north, east [m], heading [rad]; composition, and what odometry makes of them.
 
 A relative pose is forward, starboard [m] and turn [rad], seen from the earlier pose.
 """

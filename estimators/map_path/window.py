@@ -58,8 +58,6 @@ class WindowFilter:
         saturation: Value at which the receiver saturates.
     """
 
-    sensors: Models = {}
-
     def __init__(
         self,
         matcher: Matcher,
@@ -74,6 +72,7 @@ class WindowFilter:
         self._start, self._window, self._search = noise.start(start), window or Window(), search or Search()
         model = replace(matcher.model, together=len(self._window.lags))
         self.matcher, self.process = Matcher(matcher.grid, model), noise.process()
+        self.sensors: Models = {}
         self._saturation = saturation
 
     def start(self, nodes: Sequence[Node[WindowState]], index: int) -> WindowState:

@@ -47,7 +47,8 @@ def test_the_sector_has_its_area():
     assert area == pytest.approx(math.pi / 3.0 * (20.0**2 - 1.0), rel=0.01)  # cells of the edge
     eroded = GRID.holds(GRID.centres, 2.0)
     assert 0 < np.count_nonzero(eroded) < np.count_nonzero(GRID.seen)
-    assert not GRID.holds(np.array([10.0, -17.4])) and GRID.holds(np.array([10.0, -17.2]))
+    assert not GRID.holds(np.array([10.0, -17.4]))
+    assert GRID.holds(np.array([10.0, -17.2]))
 
 
 def test_a_polar_frame_keeps_its_features_places():
@@ -141,7 +142,7 @@ def test_the_grid_does_not_lock_the_match():
 
 
 def test_the_covariance_of_a_match_is_that_of_its_errors():
-    """NEES of single matches at 6 dB; a Gaussian field is an approximation, which is what the width of the band is for."""
+    """NEES of single matches at 6 dB; the band is wide since a Gaussian field is an approximation."""
     offsets, covariances = biases(Conditions(duration=30, snr=6.0), FrameModel().scaled(6.0), range(2))
     squares = np.einsum("ni,nij,nj->n", offsets, np.linalg.inv(covariances), offsets) / 3.0
     assert 0.6 < squares.mean() < 1.6

@@ -1,4 +1,4 @@
-"""The trellis of odometry errors: dynamic programming against exhaustive search, and its moments against enumeration."""
+"""The trellis of odometry errors: maxima against exhaustive search, sums against enumeration."""
 
 from itertools import product
 

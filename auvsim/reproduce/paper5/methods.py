@@ -88,6 +88,7 @@ def path(run: Run, weighting: Weighting = "field", flat: bool = False) -> Track:
     matcher = _matcher(run, weighting)
     track, estimator = follow(run, PathFilter(matcher, _start(run), flat=flat, saturation=SATURATION))
     state = estimator.nodes[-1].state
+    assert state is not None
     poses = track.poses.copy()
     for stamp, pose in state.path():
         poses[round(stamp)] = pose
