@@ -1,16 +1,21 @@
-"""Random docking trials of one seed."""
+"""Random docking trials of one seed: of the default plan, or of a scenario on top of it."""
 
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from statistics import median
+from statistics import median, stdev
+from typing import Annotated, Any
 
+import tyro
 from rich.console import RenderableType
 from rich.table import Table
 
 from auvsim.analysis.statistics import wilson
+from auvsim.base.errors import InputError
 from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.simulation import sampling
+from auvsim.simulation.loading import find
 from auvsim.studies.trials import Summary, docking_trial
 
 LATER = 3  # attempts that the default guidance has
@@ -24,6 +29,8 @@ class Options:
     """Number of trials."""
     seed: int = 7
     """Seed of every random number."""
+    scenario: Annotated[str | None, tyro.conf.arg(metavar="NAME|FILE.yaml")] = None
+    """What is pinned on top of the default plan: a shipped scenario, such as dock_by_ranges, or a file."""
     jobs: int | None = None
     """Processes; by default one for each core."""
 
@@ -54,7 +61,16 @@ class Study:
     @property
     def nees_per_dof(self) -> float:
         """Mean over trials of the NEES of the horizontal position per degree of freedom."""
-        return _mean(_known(s.estimate["all"].nees_per_dof for s in self.summaries))
+        return _mean(self._nees)
+
+    @property
+    def nees_deviation(self) -> float:
+        """Standard deviation of `nees_per_dof`, from the differences between the trials."""
+        return stdev(self._nees) / math.sqrt(len(self._nees)) if len(self._nees) > 1 else math.nan
+
+    @property
+    def _nees(self) -> list[float]:
+        return _known(s.estimate["all"].nees_per_dof for s in self.summaries)
 
     def failures(self) -> list[str]:
         """One line for each trial that did not dock: its number, reason, and the event's text."""
@@ -115,7 +131,7 @@ def table(study: Study) -> Table:
     for phase in ("all", "homing", "approach", "final", "go_around"):
         values = (study.estimate_rms("position_rms", phase), study.estimate_rms("current_rms", phase))
         row(f"estimate rms, {phase}: position and current", values, "m, m/s", ".3f")
-    row("NEES of position per degree of freedom", (study.nees_per_dof,), "1 expected")
+    result.add_row("NEES of position per degree of freedom, 95 %", _interval(study), "1 expected")
     inside = _known(s.estimate["all"].coverage_95 for s in study.summaries)
     row("truth inside the 95 % ellipse", (100.0 * _mean(inside),), "%", ".0f")
     factors = _known(s.real_time_factor for s in study.summaries)
@@ -125,11 +141,23 @@ def table(study: Study) -> Table:
 
 def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:
     """Runs the study; returns its table and a line for each trial that did not dock at once."""
-    study = run_study(options.trials, options.seed, jobs=options.jobs, progress=progress)
+    pinned: Mapping[str, Any] = {}
+    if options.scenario is not None:
+        pinned, _ = sampling.load_plan(find(options.scenario))
+        if "vehicles" in pinned:
+            raise InputError(
+                f"command line: --scenario {options.scenario} is of several vehicles; give one of one vehicle"
+            )
+    study = run_study(options.trials, options.seed, pinned, jobs=options.jobs, progress=progress)
     lines = study.failures() or ["no trial failed"]
     if study.go_arounds():
         lines.append(f"docked later: {'; '.join(study.go_arounds())}")
     return [table(study), *lines]
+
+
+def _interval(study: Study) -> str:
+    nees, half = study.nees_per_dof, 1.96 * study.nees_deviation
+    return f"{nees:.2f}" + (f"  ({nees - half:.2f} to {nees + half:.2f})" if math.isfinite(half) else "")
 
 
 def _known(values: Iterable[float | None]) -> list[float]:

@@ -6,6 +6,8 @@ import math
 import pytest
 from rich.console import Console
 
+from auvsim.base.errors import InputError
+from auvsim.studies import docking
 from auvsim.studies.docking import LATER, Options, Study, report, run_study, table
 
 SEED = 7  # not among those used for tuning
@@ -77,3 +79,13 @@ def test_a_hundred_trials_dock() -> None:
     study = run_study(100, SEED)
     assert study.docked_within(1) >= 95, study.go_arounds()
     assert study.docked_within(LATER) >= 98, study.failures()
+
+
+def test_trials_of_a_scenario(monkeypatch: pytest.MonkeyPatch, study: Study) -> None:
+    """The scenario's keys are pinned in every trial; one of several vehicles is refused."""
+    pinned = []
+    monkeypatch.setattr(docking, "run_study", lambda *arguments, **_: pinned.append(arguments[2]) or study)
+    report(Options(trials=1, scenario="dock_by_dvl"))
+    assert pinned == [{"sensors": {"dvl": {"enabled": True}, "gyro": {"enabled": True}}}]
+    with pytest.raises(InputError, match="three_vehicles is of several vehicles"):
+        report(Options(trials=1, scenario="three_vehicles"))
