@@ -1,8 +1,10 @@
 """Manoeuvres that make a worst formation observable: places of leaders over time, in the frame of the moving formation.
 
-A line of leaders through the follower tells nothing across it. A little offset tells which way, but the follower's
-mirror image across the line has nearly the same ranges: a filter that has drifted there is held there, the surer the
-more it is told. Large offsets, and those that change, are safe.
+A line of leaders through the follower tells nothing across it. A line a little aside tells how far it is, but not on
+which side: the follower's mirror image has the same ranges, and a filter that has drifted there is held there, the
+surer the more it is told. Leaders on alternate sides leave no such image: the squares of (e^2 - 2 e d_i) / (2 r_i),
+summed over leaders at distances r_i with offsets d_i, have a second minimum in the error e only where the offsets are
+much alike.
 """
 
 import math
@@ -29,6 +31,13 @@ def stagger(leaders: ArrayLike, offset: float) -> Manoeuvre:
     signs = np.where(np.arange(len(places)) % 2 == 0, 1.0, -1.0)
     staggered = places + offset * signs[:, None] * _across(places)
     return lambda time: staggered
+
+
+def aside(leaders: ArrayLike, offset: float) -> Manoeuvre:
+    """Leaders all set to one side of the follower by an offset [m], where its mirror image is two offsets away."""
+    places = np.array(leaders, dtype=float)
+    shifted = places + offset * _across(places)
+    return lambda time: shifted
 
 
 def weave(leaders: ArrayLike, amplitude: float, period: float) -> Manoeuvre:

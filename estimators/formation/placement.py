@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 
 from estimators.core.errors import ParameterError
-from estimators.core.information import range_information
+from estimators.core.information import range_information, with_known_depth
 from estimators.core.types import Array
 from estimators.formation.bounds import steady
 from estimators.formation.models import DeadReckoning
@@ -21,6 +21,7 @@ from estimators.formation.models import DeadReckoning
 Objective = Callable[[Array, Array], float]  # (follower (2,), leaders (n, 2)) -> what is to be small
 SHELLS = (0.15, 0.4, 0.7, 1.0)  # of the reach, that moves are tried at
 COURSES = 48  # of moves that are tried
+NOTHING = 1e9  # error where a direction is open [m]; finite, so that moves can be compared
 ROUNDS = 20  # of moves of all leaders in turn, at most
 
 
@@ -107,25 +108,35 @@ def optimise_bearings(deviations: ArrayLike, Q: Array | None = None, *, seed: in
     return np.remainder(best - (best[0] if Q is None else 0.0), math.pi)
 
 
-def snapshot_rms(deviations: ArrayLike) -> Objective:
-    """Objective: the least rms error of one set of ranges [m]."""
+def horizontal_information(follower: Array, leaders: Array, deviations: ArrayLike, depths: ArrayLike = 0.0) -> Array:
+    """F (2, 2) of slant ranges to leaders at `depths` (n,) [m] below the follower, whose own depth a gauge gives."""
+    below = np.broadcast_to(np.asarray(depths, dtype=float), (len(leaders),))
+    if not below.any():
+        return range_information(follower, leaders, deviations)
+    return with_known_depth(range_information((*follower, 0.0), np.column_stack((leaders, below)), deviations))
+
+
+def snapshot_rms(deviations: ArrayLike, depths: ArrayLike = 0.0) -> Objective:
+    """Objective: the least rms error of one set of ranges [m]; `depths` as of `horizontal_information`."""
 
     def objective(follower: Array, leaders: Array) -> float:
-        F = range_information(follower, leaders, deviations)
+        F = horizontal_information(follower, leaders, deviations, depths)
         det = float(np.linalg.det(F))
-        return math.sqrt(float(np.trace(F)) / det) if det > 1e-12 * float(np.trace(F)) ** 2 else 1e9
+        return math.sqrt(float(np.trace(F)) / det) if det > 1e-12 * float(np.trace(F)) ** 2 else NOTHING
 
     return objective
 
 
-def steady_rms_in_motion(deviations: ArrayLike, process: DeadReckoning, u: ArrayLike, step: float) -> Objective:
+def steady_rms_in_motion(
+    deviations: ArrayLike, process: DeadReckoning, u: ArrayLike, step: float, depths: ArrayLike = 0.0
+) -> Objective:
     """Objective: the least rms error in steady motion with an input, in a rigid formation [m]."""
     Q = process.covariance(np.zeros(2), u, step)
 
     def objective(follower: Array, leaders: Array) -> float:
-        F = range_information(follower, leaders, deviations)
+        F = horizontal_information(follower, leaders, deviations, depths)
         if not float(np.linalg.det(F)) > 1e-9 * float(np.trace(F)) ** 2:
-            return 1e9
+            return NOTHING
         return math.sqrt(float(np.trace(steady(F, Q))))
 
     return objective

@@ -10,6 +10,7 @@ from auvsim.base.frames import Array
 from auvsim.base.randomness import stream
 from estimators.formation import batched
 from estimators.formation.batched import Beliefs
+from estimators.formation.manoeuvres import Manoeuvre
 from estimators.formation.models import AugmentedDeadReckoning, DeadReckoning, InputNoise, Ranges
 from estimators.formation.smooth import SmoothKinematics
 
@@ -47,6 +48,7 @@ class Tracks(NamedTuple):
 
     errors: Array  # (s, k, 2) estimate minus truth, north and east [m]
     nees: Array  # (s, k) of the position, over 2
+    variances: Array  # (s, k) that the filter claims, of both axes together [m^2]
 
 
 def noise(seed: int, count: int, steps: int, leaders: int, of: InputNoise = NOISE) -> Runs:
@@ -58,7 +60,15 @@ def noise(seed: int, count: int, steps: int, leaders: int, of: InputNoise = NOIS
     return Runs(inputs, ranges)
 
 
-def follow(case: Case, runs: Runs, name: str, process: DeadReckoning | None = None) -> Tracks:
+def follow(
+    case: Case,
+    runs: Runs,
+    name: str,
+    *,
+    process: DeadReckoning | None = None,
+    manoeuvre: Manoeuvre | None = None,
+    start_errors: Array | None = None,
+) -> Tracks:
     """A filter of FILTERS over runs of a case.
 
     Args:
@@ -66,6 +76,8 @@ def follow(case: Case, runs: Runs, name: str, process: DeadReckoning | None = No
         runs: Noise of at least as many steps.
         name: Of the filter.
         process: Dead reckoning that the filter assumes; None: that which is true.
+        manoeuvre: Of the leaders; None: they keep their places.
+        start_errors: Of the first belief (k, 2) [m]; None: it is the truth.
     """
     process = process or (AugmentedDeadReckoning(NOISE) if name == "ukf_augmented" else DeadReckoning(NOISE))
     clean = np.array([case.speed, 0.0])
@@ -73,19 +85,27 @@ def follow(case: Case, runs: Runs, name: str, process: DeadReckoning | None = No
     truth, centre = np.zeros((count, 2)), np.zeros(2)
     step = STEPS[name](case, process)
     beliefs = step.start(count)
-    errors, nees = np.empty((case.steps, count, 2)), np.empty((case.steps, count))
+    if start_errors is not None:
+        beliefs.mean[:, :2] += start_errors
+    errors, nees, variances = (
+        np.empty((case.steps, count, 2)),
+        np.empty((case.steps, count)),
+        np.empty((case.steps, count)),
+    )
     for k in range(case.steps):
         measured = clean + runs.inputs[k]
         centre = centre + process_truth(clean, case.step)
         truth = truth + process_truth(measured, case.step) if case.wanders else np.broadcast_to(centre, truth.shape)
         u = np.broadcast_to(clean, measured.shape) if case.wanders else measured
-        leaders = case.leaders + centre
+        leaders = (case.leaders if manoeuvre is None else manoeuvre(case.step * (k + 1))) + centre
         z = RANGES.evaluate_at(truth, leaders) + np.sqrt(case.variance) * runs.ranges[k]
         beliefs = step.advance(beliefs, u, z, leaders)
         error = beliefs.mean[:, :2] - truth
         errors[k] = error
-        nees[k] = np.einsum("ki,ki->k", error, np.linalg.solve(beliefs.covariance[:, :2, :2], error[..., None])[..., 0])
-    return Tracks(errors, nees / 2.0)
+        P = beliefs.covariance[:, :2, :2]
+        nees[k] = np.einsum("ki,ki->k", error, np.linalg.solve(P, error[..., None])[..., 0])
+        variances[k] = np.trace(P, axis1=1, axis2=2)
+    return Tracks(errors, nees / 2.0, variances)
 
 
 RANGES = Ranges()
