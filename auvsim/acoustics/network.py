@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from typing import Protocol
 
 from auvsim.acoustics.message import Delivery, Fate, Message
+from auvsim.acoustics.modems import Modems
 from auvsim.physics.truth import Truth
 
 
@@ -50,15 +51,20 @@ class Service(Protocol):
 
 
 class Network:
-    """Links to each receiver, and the services that use them.
+    """Links to each receiver with the services that use them, and modems that share the water.
+
+    Services and modems work in bands of their own: neither disturbs the other.
 
     Args:
-        links: what carries messages, by the receiver's name.
+        links: what carries messages of services, by the receiver's name.
         services: what sends by itself.
+        modems: of the vehicles that have one.
     """
 
-    def __init__(self, links: Mapping[str, Link], services: Iterable[Service] = ()) -> None:
-        self._links, self._services = dict(links), tuple(services)
+    def __init__(
+        self, links: Mapping[str, Link], services: Iterable[Service] = (), modems: Modems | None = None
+    ) -> None:
+        self._links, self._services, self.modems = dict(links), tuple(services), modems
 
     def poll(self, previous: Mapping[str, Truth], now: Mapping[str, Truth]) -> list[tuple[Ping, Fate]]:
         """Lets every service send what it has between two truths, with the fate of each."""
@@ -84,6 +90,7 @@ class Network:
         return fates
 
     def deliver(self, receiver: str, now: float) -> list[Delivery]:
-        """What has arrived at a receiver by now [s], in order of arrival."""
+        """What has arrived at a receiver by now [s], in order of arrival; what modems deliver comes last."""
         link = self._links.get(receiver)
-        return link.receive(now) if link else []
+        arrived = link.receive(now) if link else []
+        return arrived + self.modems.deliver(receiver, now) if self.modems else arrived

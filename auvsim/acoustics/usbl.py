@@ -16,8 +16,8 @@ from numpy.random import Generator
 from pydantic import Field, field_validator, model_validator
 
 from auvsim.acoustics.message import Message, UsblPacket
+from auvsim.acoustics.motion import interpolate
 from auvsim.base.frames import Array, rotation, wrap
-from auvsim.base.interpolation import cubic_hermite
 from auvsim.base.randomness import Noise
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
@@ -213,23 +213,3 @@ class Usbl:
         if settings.near_range is None or settings.near_interval is None or slant_range >= settings.near_range:
             return wait
         return wait * settings.near_interval / settings.interval
-
-
-def interpolate(previous: Truth, now: Truth, time: float) -> tuple[Array, Array]:
-    """Position (3,) NED [m] and rotation (3, 3) body to NED at a time between two truths.
-
-    Position follows the cubic through both positions and velocities over ground; the Euler angles are linear.
-    """
-    width = now.time - previous.time
-    fraction = (time - previous.time) / width
-    first, last = previous.attitude.tolist(), now.attitude.tolist()
-    start_slope = rotation(*first) @ previous.nu[:3]
-    end_slope = rotation(*last) @ now.nu[:3]
-    position = [
-        cubic_hermite(*axis, width, fraction)[0]
-        for axis in zip(
-            previous.position.tolist(), now.position.tolist(), start_slope.tolist(), end_slope.tolist(), strict=True
-        )
-    ]
-    attitude = [a + fraction * wrap(b - a) for a, b in zip(first, last, strict=True)]
-    return np.array(position), rotation(*attitude)

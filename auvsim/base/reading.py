@@ -17,6 +17,7 @@ class Reading(NamedTuple):  # a frozen dataclass takes three times as long to ma
     | dvl      | (6,) u, v, w over ground, then through the water [m/s]; NaN where that track is lost     |
     | gyro     | (3,) p, q, r [rad/s]                                                                     |
     | range    | (1,) slant range to a beacon [m]                                                         |
+    | fix      | (2,) north, east [m]                                                                     |
     """
 
     sensor: str

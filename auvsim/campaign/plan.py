@@ -17,7 +17,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
 from auvsim.campaign import columns, design
 from auvsim.campaign.criterion import Criterion
-from auvsim.simulation import sampling, scenario, short
+from auvsim.simulation import controllers, sampling, scenario, short
 from auvsim.vehicles import library
 
 SHIPPED = Path(auvsim.__file__).parent / "plans"
@@ -140,7 +140,7 @@ class Plan:
 
     def _distributed(self, variant: str, trial: int) -> dict:
         cell = self.cells[trial % len(self.cells)]
-        return sampling.merge(sampling.merge(self.settings.base, cell), self.settings.variants[variant])
+        return controllers.layered(self.settings.base, cell, self.settings.variants[variant])
 
     def _places(self, variant: str) -> dict[str, str]:
         """Where each key of the scenario was given that a variant runs."""
@@ -191,8 +191,10 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Plan:
     settings = _renewed(settings)
     _check_names(settings, places)
     if "vehicles" not in settings.base:  # the short form, of which a file gives only what is to differ
-        whole = sampling.merge(_default(settings.base), settings.base)
-        settings = settings.model_copy(update={"base": whole})
+        whole = controllers.layered(_default(settings.base), settings.base)
+    else:
+        whole = controllers.in_full(settings.base)
+    settings = settings.model_copy(update={"base": whole})
     plan = Plan(settings, places)
     _check_counts(plan)
     return _checked(plan)

@@ -158,12 +158,12 @@ def _steps(given: Sequence[str]) -> tuple[str, ...]:
 
 
 def _write(found: Identification, out: Path, target: Path | None) -> list[Path]:
-    """The report; the parameters too if they are better than those the fit started from."""
+    """The report; the parameters too if nothing forbids to use them."""
     written = list(page.write(found, out))
     files = [out / PARAMETERS]
     if target is not None:
         files.append(target)
-    if not found.better:
+    if found.doubts:
         files[0].unlink(missing_ok=True)  # an earlier run's would not belong to this report
         return written
     for path in files:
@@ -230,16 +230,16 @@ def _notes(console: Console, notes: Sequence[str]) -> None:
 
 
 def show(found: Identification) -> None:
-    """Prints notes, the table of parameters, and what the data say."""
+    """Prints how far to trust the model, notes, the table of parameters, and what else the data say."""
     console = Console(markup=False, highlight=False)
+    first, *others = [f"{'+' if verdict.good else '!'} {verdict.text}" for verdict in found.verdicts]
+    console.print(first, soft_wrap=True)
     _notes(console, found.readings.notes)
     console.print(_table(found))
-    for verdict in found.verdicts:
-        console.print(f"{'+' if verdict.good else '!'} {verdict.text}", soft_wrap=True)
-    if not found.better:
-        console.print(
-            f"! no {PARAMETERS} written: the parameters that the fit started from are as good", soft_wrap=True
-        )
+    for text in others:
+        console.print(text, soft_wrap=True)
+    for doubt in found.doubts:
+        console.print(f"! no {PARAMETERS} written: {doubt}", soft_wrap=True)
 
 
 def _table(found: Identification) -> Table:

@@ -10,6 +10,7 @@ from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
 from auvsim.base.settings import OwnPart, tag_by_kind
 from auvsim.control.controller import Controller, ControllerSetup
+from auvsim.control.hovering import HoveringController, HoveringSettings
 from auvsim.control.torpedo import Autopilot, AutopilotSettings
 
 
@@ -18,10 +19,12 @@ class OwnController(OwnPart):
 
 
 ControlSettings = Annotated[
-    Annotated[AutopilotSettings, Tag("AutopilotSettings")] | Annotated[OwnController, Tag("OwnController")],
-    Discriminator(tag_by_kind(AutopilotSettings, OwnController)),
+    Annotated[AutopilotSettings, Tag("AutopilotSettings")]
+    | Annotated[HoveringSettings, Tag("HoveringSettings")]
+    | Annotated[OwnController, Tag("OwnController")],
+    Discriminator(tag_by_kind(AutopilotSettings, HoveringSettings, OwnController)),
 ]
-CONTROLLERS: dict[str, Callable[[ControllerSetup], Any]] = {"torpedo": Autopilot}
+CONTROLLERS: dict[str, Callable[[ControllerSetup], Any]] = {"torpedo": Autopilot, "hovering": HoveringController}
 
 
 def build(kind: str, setup: ControllerSetup) -> Controller:

@@ -150,6 +150,24 @@ MESSAGES: Table = {
     "fate": Variable((), "category", "", "delivered, or why not"),
 }
 
+PAYLOAD = 32  # numbers of a message's payload that a log holds
+
+RECEIVED: Table = {  # of a vehicle with a modem
+    "time": Variable((), "float64", "s", "when the modem handed the message over"),
+    "source": Variable((), "category", "", "sender"),
+    "destination": Variable((), "category", "", "whom it was for; empty: all"),
+    "kind": Variable((), "category", "", "kind of the message"),
+    "sequence": Variable((), "int32", "1", "its sequence number, by the sender"),
+    "answers": Variable((), "int32", "1", "sequence number of the request that it answers; -1 if none"),
+    "stamp": Variable((), "float64", "s", "when it was sent, by the sender's clock"),
+    "arrived": Variable((), "float64", "s", "when its first wave front arrived, by the receiver's clock"),
+    "range": Variable((), "float64", "m", "range by travel time; NaN if none was measured"),
+    "bearing": Variable((), "float64", "rad", "bearing from the bow; NaN if none was measured", "body"),
+    "bits": Variable((), "int32", "bit", "size of the message"),
+    "numbers": Variable((), "int32", "1", "numbers in its payload"),
+    "payload": Variable(("number",), "float64", "SI", "these numbers, then NaN"),
+}
+
 MODELS: Table = {  # a row for each model of the run; logs may lack the group
     **TIME,
     "kind": Variable((), "category", "", "vehicle or structure"),
@@ -193,6 +211,7 @@ def vehicle_groups(
     demands: Table,
     channels: Mapping[str, str],
     states: Mapping[str, str],
+    modem: bool = False,
 ) -> dict[str, Group]:
     """Groups of one vehicle by their paths below it: `truth`, `sensors/compass`, ...
 
@@ -202,6 +221,7 @@ def vehicle_groups(
         demands: Variables of what the controller asks of the actuation.
         channels: Units of the actuators by channel, in their order.
         states: Units of the estimated states by name, in their order.
+        modem: Whether the vehicle has one.
     """
     phases, variables = mission
     phase = replace(MISSION["phase"], flags=tuple(phases))
@@ -216,6 +236,7 @@ def vehicle_groups(
         "mission": Group({**MISSION, "phase": phase, **variables}),
         "command": Group({**COMMAND, **demands}),
         "contact": Group(CONTACT),
+        **({"received": Group(RECEIVED, {"number": PAYLOAD})} if modem else {}),
         **{f"sensors/{name}": Group(sensor_table(table), sizes) for name, (table, sizes) in sensors.items()},
     }
 

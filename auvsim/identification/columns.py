@@ -7,7 +7,7 @@ from above, sway to starboard, surge and sway through the water. A mapping file 
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -85,6 +85,7 @@ class ColumnSettings(Settings):
     constant: float | None = Field(default=None, description="instead of a column: one value for all times")
     unit: str | None = Field(default=None, description="unit of the column, if its header does not say")
     sign: float = Field(default=1.0, description="-1 turns the column's positive direction round")
+    offset: float = Field(default=0.0, description="added after that, in the column's unit: 90 for a heading from east")
     time: str | None = Field(default=None, description="its own column of time stamps")
     sd: float | None = Field(default=None, gt=0, description="standard deviation of a sample, in the column's unit")
 
@@ -102,6 +103,8 @@ class Meaning:
     quantity: str
     column: str
     factor: float  # from its values to SI
+    offset: float = 0.0  # added after that [SI]
+    declared: bool = True  # whether the file or a map gives its unit
     time: str | None = None  # its own column of time stamps
     deviation: float | None = None  # of a sample [SI]
     assumed: str | None = None  # the unit that was taken because none was given
@@ -119,6 +122,11 @@ def split_header(header: str) -> tuple[str, str | None]:
         if len(parts) > count and _spelled(unit) is not None and len(unit) > 1:
             return "_".join(parts[:-count]), unit
     return header, None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that is understood."""
+    return bool(text) and _spelled(text) is not None
 
 
 def _spelled(unit: str) -> str | None:
@@ -212,11 +220,13 @@ def _mapped(name: str, settings: ColumnSettings, headers: Mapping[str, str | Non
             raise InputError(f"{where}: {name}: {unknown_name('column', wanted, list(headers))}")
     unit = settings.unit or headers[column] or split_header(column)[1]
     meaning = _meaning(name, column, unit, where)
-    deviation = None if settings.sd is None else settings.sd * meaning.factor
-    return Meaning(
-        quantity=name, column=column, factor=settings.sign * meaning.factor, time=settings.time,
-        deviation=deviation, assumed=meaning.assumed,
-    )  # fmt: skip
+    return replace(
+        meaning,
+        factor=settings.sign * meaning.factor,
+        offset=settings.offset * meaning.factor,
+        time=settings.time,
+        deviation=None if settings.sd is None else settings.sd * meaning.factor,
+    )
 
 
 def _meaning(quantity: str, column: str, unit: str | None, where: str) -> Meaning:
@@ -225,7 +235,7 @@ def _meaning(quantity: str, column: str, unit: str | None, where: str) -> Meanin
     units = UNITS[QUANTITIES[quantity].kind]
     if unit is None or quantity == "manoeuvre":
         assumed = None if quantity in ("manoeuvre", "time") else next(iter(units))
-        return Meaning(quantity=quantity, column=column, factor=1.0, assumed=assumed)
+        return Meaning(quantity=quantity, column=column, factor=1.0, assumed=assumed, declared=unit is not None)
     if quantity == "time" and " since " in unit:  # as NetCDF's conventions give it
         unit = unit.split(" since ")[0]
     return Meaning(quantity=quantity, column=column, factor=factor(unit, quantity, f"{where}: column '{column}'"))
@@ -246,7 +256,4 @@ def _with_stamps(meaning: Meaning, headers: Mapping[str, str | None], stamps: se
     names = [meaning.quantity, plain(split_header(meaning.column)[0]), *QUANTITIES[meaning.quantity].sensor.split()]
     own = next((name for name in names if name in stamps), None)
     column = next((header for header in headers if own is not None and _time_of(header) == own), None)
-    return Meaning(
-        quantity=meaning.quantity, column=meaning.column, factor=meaning.factor, time=column,
-        deviation=meaning.deviation, assumed=meaning.assumed,
-    )  # fmt: skip
+    return replace(meaning, time=column)

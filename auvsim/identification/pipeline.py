@@ -1,7 +1,7 @@
 """From readings to parameters, step by step, and what the data say of each: never more than they do."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +32,8 @@ NOISY = 1.1  # residuals beyond this many deviations show noise of the process
 LACKING = 2.0  # residuals beyond this many show what the model lacks: then the deviations bear it too
 REWEIGHTED = 3  # times at most
 STEP_MARGIN = 0.03  # by which an earlier step must predict the fitted records better than the last to be kept instead
+LARGEST_SHARE = 0.25  # error on what was held out, by the distance run, beyond which no parameters are written
+LARGEST_RESIDUAL = 20.0  # standard deviations, likewise
 NAMES = tuple(name.replace("_", " ") for name in MEASURED)
 
 
@@ -84,6 +86,11 @@ class Identification:
     def better(self) -> bool:
         """Whether the fit predicts what was held out better than its start does."""
         return self.share < (1.0 - judgement.MARGIN) * self.start_share
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """Why its parameters are not to be used at all, each with what to look at; empty where nothing forbids it."""
+        return tuple(_doubts(self))
 
 
 def identify(
@@ -328,11 +335,27 @@ def _verdicts(found: Identification) -> list[Verdict]:
 
 def _judgement(found: Identification, seconds: float) -> Verdict:
     shares = f"{found.share:.2%} of the distance run after {seconds:.0f} s, its start {found.start_share:.2%}"
+    shares += f" (a vehicle of {found.start.m:.4g} kg, as {found.vehicle} has: forces are by that mass)"
     if found.better:
         return Verdict(good=True, text=f"on what was held out the fit is off by {shares}")
     worse = found.share > (1.0 + judgement.MARGIN) * found.start_share
     text = f"on what was held out the fit is {'worse' if worse else 'no better'} than its start: off by {shares}"
     return Verdict(good=False, text=f"{text}; keep the start, or log other manoeuvres")
+
+
+def _doubts(found: Identification) -> Iterator[str]:
+    if not found.better:
+        yield "it predicts what was held out no better than its start: log other manoeuvres"
+    if found.share > LARGEST_SHARE:
+        yield (
+            f"it is off by {found.share:.0%} of the distance run on what was held out, more than {LARGEST_SHARE:.0%}: "
+            "look at units, signs and stamps, and whether the vehicle is this one"
+        )
+    if not found.fit.converged:
+        yield f"it has not converged ({found.fit.message}): log more, or with a rudder that moves more"
+    for name, rms in zip(NAMES, found.fit.residual_rms.tolist(), strict=True):
+        if rms > LARGEST_RESIDUAL:
+            yield f"{name} is {rms:.0f} standard deviations off what the model explains: look at its unit, sign and lag"
 
 
 def _shares(judged: HoldoutResult) -> str:

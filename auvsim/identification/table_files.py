@@ -1,10 +1,5 @@
 """CSV and NetCDF files of a user's vehicle as named columns of numbers and texts."""
 
-import csv
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -14,23 +9,13 @@ from numpy.typing import NDArray
 from scipy.io import netcdf_file
 
 from auvsim.base.errors import InputError
+from auvsim.identification import table_text
+from auvsim.identification.table_text import Column
 from estimators.core.types import Array
 
-MISSING = {"", "nan", "na", "n/a", "null", "none", "-", "--"}
 
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Column:
-    """A column as it stands in a file."""
-
-    values: Array  # (n,) NaN where there is no number
-    texts: NDArray[Any] | None = None  # (n,) the same as texts, where they are no numbers
-    unit: str | None = None  # that the file gives apart from the name
-    time: str | None = None  # the column that stamps it, where the file says so
-
-
-def load(path: Path) -> dict[str, Column]:
-    """The columns of a CSV file (comma, semicolon or tab; `#` begins a comment) or of a NetCDF file.
+def load(path: Path) -> tuple[dict[str, Column], list[str]]:
+    """The columns of a text file (see `table_text`) or of a NetCDF file, and notes on how it was understood.
 
     Raises:
         InputError: If it cannot be read as either.
@@ -41,74 +26,10 @@ def load(path: Path) -> dict[str, Column]:
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None
     if head.startswith(b"\x89HDF"):
-        return _from_hdf(path)
+        return _from_hdf(path), []
     if head.startswith(b"CDF"):
-        return _from_classic(path)
-    return _from_csv(path)
-
-
-def _from_csv(path: Path) -> dict[str, Column]:
-    try:
-        text = path.read_text(encoding="utf-8-sig")
-    except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: neither NetCDF nor a CSV text of UTF-8: {' '.join(str(error).split())}") from None
-    lines = [line for line in text.splitlines() if line.strip() and not line.lstrip().startswith("#")]
-    if len(lines) < 2:
-        raise InputError(f"{path}: holds no rows; a CSV file has a line of column names and a row for each time")
-    delimiter = max(",;\t", key=lines[0].count)
-    header, *rows = csv.reader(lines, delimiter=delimiter)
-    names = [name.strip() for name in header]
-    if all(_is_number(name) for name in names):
-        raise InputError(f"{path}: the first line holds numbers; give each column a name, such as `heading [deg]`")
-    twice = sorted({name for name in names if names.count(name) > 1 and name})
-    if twice:
-        raise InputError(f"{path}: column '{twice[0]}' is there twice; give each its own name")
-    for number, row in enumerate(rows, start=2):
-        if len(row) != len(names):
-            raise InputError(f"{path}: row {number} has {len(row)} values, the first line names {len(names)} columns")
-    columns = zip(*rows, strict=True)
-    return {name: _column(list(cells)) for name, cells in zip(names, columns, strict=True) if name}
-
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def _column(cells: list[str]) -> Column:
-    cells = [cell.strip() for cell in cells]
-    values = np.full(len(cells), np.nan)
-    texts = False
-    for k, cell in enumerate(cells):
-        if cell.lower() in MISSING:
-            continue
-        try:
-            values[k] = float(cell)
-        except ValueError:
-            texts = True
-    if not texts:
-        return Column(values=np.where(np.isfinite(values), values, np.nan))
-    clocks = list(_clock_times(cells))
-    if sum(clock is not None for clock in clocks) > 0.5 * len(cells):
-        return Column(values=np.array([np.nan if clock is None else clock for clock in clocks]), unit="s")
-    return Column(values=values, texts=np.array(cells, dtype=object))
-
-
-def _clock_times(cells: list[str]) -> Iterator[float | None]:
-    """Seconds of ISO 8601 texts, UTC where they name no zone."""
-    for cell in cells:
-        if not re.match(r"\d{4}-\d\d-\d\d[T ]", cell):
-            yield None
-            continue
-        try:
-            moment = datetime.fromisoformat(cell)
-        except ValueError:
-            yield None
-            continue
-        yield (moment if moment.tzinfo else moment.replace(tzinfo=UTC)).timestamp()
+        return _from_classic(path), []
+    return table_text.read(path)
 
 
 def _from_hdf(path: Path) -> dict[str, Column]:

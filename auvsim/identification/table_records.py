@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import NamedTuple
@@ -9,16 +10,19 @@ from typing import NamedTuple
 import numpy as np
 
 from auvsim.base.errors import InputError
-from auvsim.identification import checks
+from auvsim.identification import checks, cleaning, places, stamps
 from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, understand
 from auvsim.identification.records import MEASURED
 from auvsim.identification.signals import Signal, Signals, noise, steep
-from auvsim.identification.table_files import Column, load
+from auvsim.identification.table_files import load
+from auvsim.identification.table_text import Column
 from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
 NEEDED = ("time", "rudder", "shaft_speed")
-_EXAMPLES = {"time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]"}
+_EXAMPLES = {
+    "time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]", "heading or yaw_rate": "heading [deg]",
+}  # fmt: skip
 
 
 class _Piece(NamedTuple):
@@ -38,6 +42,7 @@ class _Table(NamedTuple):
     meanings: Mapping[str, Meaning]  # by quantity
     constants: Mapping[str, float]  # by quantity [SI]
     time: Array  # of the rows [s]
+    origin: float  # of that in the file's own time [s]
 
 
 def signals(
@@ -54,7 +59,7 @@ def signals(
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
     """
-    columns = load(path)
+    columns, read = load(path)
     headers = {name: column.unit for name, column in columns.items()}
     meanings, unknown = understand(headers, mapping, str(path))
     by_quantity = {meaning.quantity: meaning for meaning in meanings}
@@ -66,11 +71,12 @@ def signals(
     if not shaft and inputs and "shaft_speed" not in by_quantity:
         constants.setdefault("shaft_speed", 0.0)
     _require(path, by_quantity.keys() | constants.keys(), list(columns), NEEDED if inputs else NEEDED[:1])
+    time, said = stamps.seconds(columns, by_quantity["time"], path)
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
-    time = columns[by_quantity["time"].column].values * by_quantity["time"].factor
-    table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time))
-    notes = list(_assumptions(table, unknown))
+    columns, placed = places.degrees(columns, by_quantity, path)
+    table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time), float(np.nanmin(time)))
+    notes = [*read, *said, *placed, *_assumptions(table, unknown)]
     if inputs and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
         notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
     found = []
@@ -85,14 +91,17 @@ def signals(
 
 def _require(path: Path, there: set[str], columns: Sequence[str], needed: Sequence[str]) -> None:
     there = there | ({"rudder"} if "rudder_command" in there else set())
-    for quantity in needed:
-        if quantity not in there:
-            raise InputError(
-                f"{path}: no column is the {quantity.replace('_', ' ')}; there are {', '.join(columns)}; "
-                f"name one `{_EXAMPLES[quantity]}` or say which with --columns"
-            )
+    missing = [quantity for quantity in needed if quantity not in there]
     if not {"heading", "yaw_rate"} & there:
-        raise InputError(f"{path}: neither heading nor yaw rate is there; name a column `heading [deg]` or `r [deg/s]`")
+        missing.append("heading or yaw_rate")
+    if missing:
+        named = ", no column the ".join(quantity.replace("_", " ") for quantity in missing)
+        examples = ", ".join(f"`{_EXAMPLES[quantity]}`" for quantity in missing)
+        one = "name one" if len(missing) == 1 else "name them"
+        raise InputError(
+            f"{path}: no column is the {named}; there are {', '.join(columns)}; "
+            f"{one} {examples} or say which with --columns"
+        )
 
 
 def _assumptions(table: _Table, unknown: Sequence[str]) -> Iterator[str]:
@@ -146,12 +155,15 @@ def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Si
     for quantity, meaning in table.meanings.items():
         if QUANTITIES[quantity].kind in ("time", "text"):
             continue
-        times, values, missing, repeated = _samples(table, piece, meaning)
+        times, raw, missing, repeated = _samples(table, piece, meaning)
+        times, values, dropped = cleaning.clean(times, raw, meaning.factor, quantity, QUANTITIES[quantity].kind)
+        values = values + meaning.offset
+        notes += [f"{label}: {meaning.column}: {text}" for text in dropped]
         if missing or repeated:
             parts = [f"{missing} missing"] * bool(missing) + [f"{repeated} with repeated stamps dropped"] * bool(
                 repeated
             )
-            notes.append(f"{label}: {meaning.column}: of {len(values) + missing + repeated} samples {', '.join(parts)}")
+            notes.append(f"{label}: {meaning.column}: of {len(raw) + missing + repeated} samples {', '.join(parts)}")
         if len(times) < 2:
             continue
         if quantity == "heading":
@@ -178,14 +190,13 @@ def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Si
 
 
 def _samples(table: _Table, piece: _Piece, meaning: Meaning) -> tuple[Array, Array, int, int]:
-    """Stamps and values [SI] of a column in a manoeuvre; how many are missing, and how many stamps repeated."""
+    """Stamps [s] of a column in a manoeuvre, values as in the file; how many are missing, how many stamps repeated."""
     column = table.columns[meaning.column]
-    values, time = column.values * meaning.factor, table.time
+    values, time = column.values, table.time
     own = meaning.time or (column.time if column.time in table.columns else None)
     if own is not None and own != table.meanings["time"].column:
-        origin = table.columns[table.meanings["time"].column].values * table.meanings["time"].factor
-        scale = table.meanings["time"].factor
-        time = table.columns[own].values * scale - np.nanmin(origin)
+        time, _ = stamps.seconds(table.columns, replace(table.meanings["time"], column=own), table.path)
+        time = time - table.origin
         chosen = (time >= piece.start) & (time <= piece.stop)
         time, values = time[chosen], values[chosen]
     elif len(values) == len(time):

@@ -1,4 +1,4 @@
-"""What a log's velocities are, by its own heading and positions: in which axes, of which sign, over ground or not."""
+"""What a log's heading and velocities are, by its own positions: counted from where, in which axes, of which sign."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -35,6 +35,8 @@ def check(one: Signals) -> list[str]:
     if not {"north", "east", "heading"} <= given.keys():
         return []
     notes = []
+    if not {"surge", "ground_surge"} & given.keys():
+        _heading_by_course(one)
     for forward, starboard in PAIRS:
         if forward not in given:
             continue
@@ -50,6 +52,40 @@ def check(one: Signals) -> list[str]:
                              f"{meanings[best].said}")  # fmt: skip
         notes += _over_ground(one.name, forward, moved, meanings[0].velocity)
     return notes
+
+
+def _heading_by_course(one: Signals) -> None:
+    """Refuses a heading that is not that of the course which the positions make good, but of it counted otherwise.
+
+    Raises:
+        InputError: It is; with the column map that would mend it.
+    """
+    north, east, heading = (one.signals[name] for name in ("north", "east", "heading"))
+    start, stop = max(north.times[0], heading.times[0]), min(north.times[-1], heading.times[-1])
+    edges = np.arange(start, stop, WINDOW)
+    if len(edges) <= LEAST:
+        return
+    moved = np.diff(np.interp(edges, north.times, north.values) + 1j * np.interp(edges, east.times, east.values))
+    psi = np.interp(0.5 * (edges[1:] + edges[:-1]), heading.times, heading.values)
+    fast = np.abs(moved) > 0.3 * np.median(np.abs(moved))
+    course, turn = moved[fast] / np.abs(moved[fast]), np.exp(1j * psi[fast])
+    if len(course) <= LEAST or abs(turn.mean()) > TURNED:
+        return
+    meanings = {
+        "": turn,
+        "from east, against the clock: `heading: {column: ..., sign: -1, offset: 90}`": 1j * turn.conj(),
+        "from east: `heading: {column: ..., offset: 90}`": 1j * turn,
+        "against the clock: `heading: {column: ..., sign: -1}`": turn.conj(),
+        "from the stern: `heading: {column: ..., offset: 180}`": -turn,
+    }
+    # A current turns the course, and drift adds to it: what agrees best by far is meant.
+    agrees = {said: float(np.mean((course * by.conj()).real)) for said, by in meanings.items()}
+    best = max(agrees, key=lambda said: agrees[said])
+    if best and agrees[best] > 0.8 and agrees[""] < 0.4:
+        raise InputError(
+            f"{one.name}: positions contradict the heading, which counts {best} in --columns mends it (offset in the "
+            "column's unit; and a rudder counted likewise needs `sign: -1`)"
+        )
 
 
 def _displacements(given: Mapping[str, Signal], forward: str, starboard: str) -> tuple[Complex, list[_Meaning]] | None:
@@ -81,7 +117,11 @@ def _displacements(given: Mapping[str, Signal], forward: str, starboard: str) ->
         (-turn * body, "the vehicle goes backwards by them; turn the surge round with `sign: -1` in --columns"),
         (turn * body.conj(), "sway is to port; it must be to starboard: turn it round with `sign: -1` in --columns"),
         (turn.conj() * body, "the heading counts against the clock; turn it round with `sign: -1` in --columns"),
-        (1j * turn.conj() * body, "the heading counts from east, against the clock; give 90 deg less it"),
+        (
+            1j * turn.conj() * body,
+            "the heading counts from east, against the clock; `heading: {column: ..., sign: -1, offset: 90}` in "
+            "--columns mends it (offset in the column's unit)",
+        ),
     ]
     places = np.interp(edges, north.times, north.values) + 1j * np.interp(edges, east.times, east.values)
     return np.diff(places), [_Meaning(moved(velocity), said) for velocity, said in meanings]

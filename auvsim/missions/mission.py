@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
-from auvsim.acoustics.message import Delivery
+from auvsim.acoustics.message import Delivery, Outgoing
 from auvsim.base.reading import Reading
 from auvsim.control.controller import Setpoints
 from auvsim.data.log import VehicleLog
@@ -71,7 +71,7 @@ class Mission:
     """A mission; made by `Class(setup)`.
 
     A subclass sets `phases`, keeps `phase` (the index of the present one) and `finished` up to date, appends to
-    `events`, and implements `update`. All else has defaults, which it may override.
+    `events`, and to `outbox` what its vehicle's modem is to send, and implements `update`. All else has defaults, which it may override.
     """
 
     phases: ClassVar[tuple[str, ...]]  # names of the phases, as logged
@@ -83,6 +83,7 @@ class Mission:
         self.phase = 0
         self.finished = False
         self.events: list[Event] = []
+        self.outbox: list[Outgoing] = []
         self.dock: Place | None = None  # the structure at which it ends, if any
 
     @property

@@ -10,6 +10,8 @@ from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
 from auvsim.base.settings import OwnPart, tag_by_kind
 from auvsim.missions.docking.guidance import Docking, DockingSettings
+from auvsim.missions.hovering.docking import HoveringDocking, HoveringDockingSettings
+from auvsim.missions.hovering.hold import Hold, HoldSettings
 from auvsim.missions.manoeuvres.mission import Manoeuvre
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.missions.mission import Mission, MissionSetup
@@ -24,10 +26,22 @@ MissionSettings = Annotated[
     Annotated[DockingSettings, Tag("DockingSettings")]
     | Annotated[ManoeuvreMissionSettings, Tag("ManoeuvreMissionSettings")]
     | Annotated[TrackSettings, Tag("TrackSettings")]
+    | Annotated[HoldSettings, Tag("HoldSettings")]
+    | Annotated[HoveringDockingSettings, Tag("HoveringDockingSettings")]
     | Annotated[OwnMission, Tag("OwnMission")],
-    Discriminator(tag_by_kind(DockingSettings, ManoeuvreMissionSettings, TrackSettings, OwnMission)),
+    Discriminator(
+        tag_by_kind(
+            DockingSettings, ManoeuvreMissionSettings, TrackSettings, HoldSettings, HoveringDockingSettings, OwnMission
+        )
+    ),
 ]
-MISSIONS: dict[str, type[Mission]] = {"docking": Docking, "manoeuvre": Manoeuvre, "track": Track}
+MISSIONS: dict[str, type[Mission]] = {
+    "docking": Docking,
+    "manoeuvre": Manoeuvre,
+    "track": Track,
+    "hold": Hold,
+    "hovering_docking": HoveringDocking,
+}
 
 
 def find(kind: str) -> type[Mission] | Callable[[MissionSetup], Any]:

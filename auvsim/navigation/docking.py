@@ -162,7 +162,10 @@ def navigator(
             "give sensors of kind range, or sensors.usbl.enabled: true"
         )
     if not isinstance(actuation, FinsAndShaft):
-        raise InputError(f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft")
+        raise InputError(
+            f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft, and the vehicle is driven by "
+            "thrusters; take dead_reckoning"
+        )
     readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
     biases = {**aids.biases(used, setup.sensors.get("compass")), **base.biases}
     noise = replace(base, compass=math.radians(s.compass_deg) / math.sqrt(readings), biases=biases)

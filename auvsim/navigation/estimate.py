@@ -1,5 +1,6 @@
 """An estimate: named states with covariance, the views that control and plots use, outcomes of measurements."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -52,6 +53,15 @@ class Estimate:
     def horizontal_covariance(self) -> Array:
         """(2, 2) of north and east [m2], which are the first two states."""
         return self.covariance[:2, :2]
+
+    def at(self, time: float) -> tuple[Array, Array, float]:
+        """By dead reckoning, at a time [s]: north, east (2,) [m]; velocity over ground, body (2,) [m/s]; heading [rad]."""
+        dt, turn = time - self.time, float(self.velocity[2])
+        heading = self.heading + turn * dt
+        cos, sin = math.cos(heading), math.sin(heading)
+        to_ned = np.array(((cos, -sin), (sin, cos)))
+        over_ground = self.velocity[:2] + self.current @ to_ned
+        return self.position[:2] + to_ned @ over_ground * dt, over_ground, heading
 
 
 def estimator_events(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:

@@ -11,6 +11,7 @@ from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.depth import DepthSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.feedback import FeedbackSettings
+from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Actuation
@@ -27,6 +28,7 @@ FASTEST, SPEED, JOLT = (
     20.0,
     10.0,
 )  # of a range [m/s]; largest speed [m/s], its fastest change, bumps included [m/s2]
+FARTHEST = 1e6  # position from the datum [m]
 RATE = 10.0  # largest rate of turn [rad/s]
 
 
@@ -103,6 +105,8 @@ def _limits(settings: Any, actuation: Actuation, frozen: bool) -> list[Limits]:
             return [noisy(sigma, -SPEED, SPEED, JOLT) for sigma in sigmas]
         case RangeSettings():
             return [noisy(settings.noise, -SURE * settings.noise, 1.1 * settings.maximum, FASTEST)]
+        case FixSettings():
+            return [Limits(low=-FARTHEST, high=FARTHEST)] * 2
         case FeedbackSettings():
             return [Limits(low=2.0 * low, high=2.0 * high) for low, high in actuation.limits.tolist()]
     return []

@@ -5,13 +5,11 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
-from pydantic import Field
-
 from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
-from auvsim.base.settings import Settings
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.types import Measurement
@@ -19,12 +17,6 @@ from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
 from estimators.docking.models import COMPASS
 
 FIX = "fix"  # kind of measurement
-
-
-class FixSettings(Settings):
-    """Positions from elsewhere, such as a log's: north and east from the datum."""
-
-    noise: float = Field(default=0.5, gt=0.0, description="white noise of each axis, sd [m]")
 
 
 def measurements(

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol, runtime_checkable
 
 from auvsim.acoustics.message import Delivery
+from auvsim.acoustics.modem import ModemSettings
 from auvsim.acoustics.usbl import UsblSettings
 from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
@@ -66,13 +67,16 @@ class NavigatorSetup:
 
     vehicle: str  # its name
     settings: Any  # of the estimator; of a user's own, its class `Settings` or what stands under `settings`
-    parameters: PlanarParameters  # the planar model that it assumes
+    parameters: PlanarParameters | None  # the planar model that it assumes; None of one that thrusters drive
     actuation: Actuation
     period: float  # time between two updates [s]
     rates: Mapping[str, float]  # of the sensors that the vehicle has, by name [Hz]
     usbl: UsblSettings  # lever arms of the dock's USBL
     dock: StructurePose | None = None  # charted pose of the mission's dock
     sensors: Mapping[str, Any] = field(default_factory=dict)  # settings of those on board by name: data sheets, places
+    modem: ModemSettings | None = None  # data sheet of its modem
+    others: tuple[str, ...] = ()  # names of the other vehicles that have a modem
+    start: tuple[float, float] = (0.0, 0.0)  # planned, north and east [m]
 
 
 NavigatorFactory = Callable[[NavigatorSetup], Navigator]

@@ -11,8 +11,9 @@ from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.reading import Reading
 from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
-from auvsim.navigation.measurements import FIX, FixSettings, measurements, of_kind
+from auvsim.navigation.measurements import FIX, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter
@@ -51,7 +52,10 @@ class ReckoningNavigator:
         self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))
         process = MotionProcess(
             motion,
-            {"surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12},
+            {
+                "north": s.position_noise, "east": s.position_noise, "surge": s.acceleration, "sway": s.acceleration,
+                "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
+            },
         )
         models = {
             COMPASS: sensors.compass(motion, bias="compass_bias"),

@@ -7,7 +7,7 @@ from typing import Any
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
-from auvsim.navigation import docking, reckoning
+from auvsim.navigation import docking, following, reckoning
 from auvsim.navigation.navigator import Navigator, NavigatorFactory, NavigatorSetup
 
 _SHIPPED: tuple[NavigatorFactory, ...] = (
@@ -23,7 +23,10 @@ _SHIPPED: tuple[NavigatorFactory, ...] = (
 ESTIMATORS: dict[str, NavigatorFactory] = {  # of docking
     factory.__name__: factory for factory in _SHIPPED
 }
-GENERAL: dict[str, NavigatorFactory] = {"dead_reckoning": reckoning.dead_reckoning}  # that need no dock
+GENERAL: dict[str, NavigatorFactory] = {  # that need no dock
+    "dead_reckoning": reckoning.dead_reckoning,
+    "range_ekf": following.range_ekf,
+}
 ALL = {**ESTIMATORS, **GENERAL}
 
 

@@ -32,7 +32,7 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, "
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, range_ekf, paper, current_only, delay_only, "
         "regular_ekf, module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
@@ -72,10 +72,30 @@ class ReckoningSettings(_Assumed):
     """Dead reckoning by DVL, gyro and compass, with fixes and ranges; it needs no model of the vehicle."""
 
     kind: Literal["dead_reckoning"] = "dead_reckoning"
+    position_noise: float = Field(
+        default=0.0, ge=0, description="process noise of position, for errors of scale and mounting of a DVL [m2/s]"
+    )
     acceleration: float = Field(default=0.01, ge=0, description="process noise of surge and sway [m2/s3]")
     yaw_acceleration: float = Field(default=0.01, ge=0, description="process noise of yaw rate [rad2/s3]")
     compass_error_deg: float = Field(default=1.0, gt=0, description="constant error of the compass it estimates [deg]")
     dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
+
+
+class FollowerSettings(_Assumed):
+    """A filter of a follower that hears where others are, and ranges to them by their packets."""
+
+    kind: Literal["range_ekf"] = "range_ekf"
+    north: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    east: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    position_noise: float = Field(
+        default=1e-3, ge=0, description="process noise of position, for errors of scale and mounting of a DVL [m2/s]"
+    )
+    position: float = Field(default=3.0, gt=0, description="error of the assumed start along each axis, sd [m]")
+    current: float = Field(default=0.5, gt=0, description="unknown current along each axis, sd [m/s]")
+    current_noise: float = Field(default=1e-7, ge=0, description="random walk of the current [m2/s3]")
+    acceleration: float = Field(default=0.01, ge=0, description="process noise of surge and sway [m2/s3]")
+    yaw_acceleration: float = Field(default=0.01, ge=0, description="process noise of yaw rate [rad2/s3]")
+    range_noise: float = Field(default=0.5, gt=0, description="error of a range besides arrival times and packet [m]")
 
 
 class OwnEstimator(OwnPart, _Assumed):
@@ -87,6 +107,11 @@ EstimatorSettings = Annotated[
     | Annotated[InteractingSettings, Tag("InteractingSettings")]
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
+    | Annotated[FollowerSettings, Tag("FollowerSettings")]
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
-    Discriminator(tag_by_kind(AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, OwnEstimator)),
+    Discriminator(
+        tag_by_kind(
+            AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, FollowerSettings, OwnEstimator
+        )
+    ),
 ]

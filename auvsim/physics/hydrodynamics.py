@@ -2,10 +2,12 @@
 
 A body `hull` is described by `<custom><numeric>` fields named `hull_<field>`, in SNAME form and forward-starboard-down
 axes about the body's origin, which is its centre of buoyancy; matrices are Fossen's positive M_A and D. Fins and
-propellers are bodies of their own with their own fields. PyMJCF prefixes bodies and fields alike when a vehicle is
+propellers are bodies of their own with their own fields; `fin_<field>` and `thruster_<field>` hold for all of a vehicle
+that do not give their own. PyMJCF prefixes bodies and fields alike when a vehicle is
 attached.
 """
 
+import re
 from typing import Any, NamedTuple
 
 import mujoco
@@ -49,6 +51,9 @@ _MATRICES = ("added_mass", "linear_damping", "quadratic_damping")
 _SIGNED = ("body_lift_x", "reaction", "strip_x", "thrust_coefficients", "torque_coefficients", *_MATRICES)
 
 
+_COMMON = re.compile(r"(?P<prefix>.*/)?(?P<kind>fin|thruster)_(?P<field>\w+)")  # of all bodies of a kind, in one line
+
+
 class Body(NamedTuple):
     """One body with hydrodynamic fields."""
 
@@ -66,16 +71,30 @@ def bodies(model: mujoco.MjModel) -> list[Body]:
     """
     names = [model.body(i).name for i in range(model.nbody)]
     found: dict[str, dict[str, Array]] = {}
+    common: dict[tuple[str, str], dict[str, Array]] = {}  # fields of all fins or thrusters of a vehicle, by its prefix
     known = {field for _, table in _KINDS.values() for field in table}
     for i in range(model.nnumeric):
         numeric = model.numeric(i)
         owners = [name for name in names if name and numeric.name.startswith(f"{name}_")]
+        if (
+            not owners
+            and (of_kind := _COMMON.fullmatch(numeric.name))
+            and of_kind["field"] in _KINDS[of_kind["kind"]][1]
+        ):
+            fields = common.setdefault((of_kind["prefix"] or "", of_kind["kind"]), {})
+            fields[of_kind["field"]] = np.array(numeric.data, dtype=float)
+            continue
         if not owners:
             if any(numeric.name.endswith(f"_{field}") for field in known):
                 raise InputError(f"numeric '{numeric.name}' names no body; bodies: {', '.join(filter(None, names))}")
             continue
         owner = max(owners, key=len)
         found.setdefault(owner, {})[numeric.name[len(owner) + 1 :]] = np.array(numeric.data, dtype=float)
+    for name, fields in found.items():
+        prefix = name[: name.rfind("/") + 1]
+        for kind in ("fin", "thruster"):
+            if fields.keys() <= _KINDS[kind][1].keys():
+                found[name] = common.get((prefix, kind), {}) | fields
     return [_check(names.index(name), name, fields) for name, fields in found.items()]
 
 

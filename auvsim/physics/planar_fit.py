@@ -1,6 +1,7 @@
 """Fits the planar rudder-driven model that estimators assume to a vehicle's hydrodynamics; gives the fit's error."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -68,6 +69,7 @@ class Level:
         if hull is None:
             raise InputError(f"model {name}: the body 'hull' has no numerics such as 'hull_added_mass'")
         self.added_mass = hull.fields["added_mass"]
+        self.linear_damping = hull.fields.get("linear_damping", np.zeros((6, 6)))
         self.volume = float(hull.fields["displaced_volume"][0])  # [m3]
         mujoco.mj_forward(self.model, self.data)
         full = np.zeros((self.model.nv, self.model.nv))
@@ -85,6 +87,14 @@ class Level:
     def forces(self, u: float, *, rudder: float = 0.0, elevator: float = 0.0, shaft_speed: float = 0.0) -> Array:
         """Force and moment (6,) on a vehicle that moves straight ahead [N, N m], forward-starboard-down."""
         return FLIP6 * self._forward(u, 0.0, 0.0, Commands(rudder, elevator, shaft_speed))[:6]
+
+    def resistance(self, nu: Sequence[float]) -> Array:
+        """Force and moment (6,) on a vehicle of body velocity `nu` (6,), all actuators at rest; SNAME [N, N m]."""
+        data = self.data
+        mujoco.mj_resetData(self.model, data)
+        data.qvel[:6] = FLIP6 * np.asarray(nu)  # level: the axes of the body are those of the world
+        mujoco.mj_forward(self.model, data)
+        return FLIP6 * (data.qfrc_passive - data.qfrc_bias)[:6]
 
     def _forward(self, u: float, v: float, r: float, demand: Commands) -> Array:
         """Generalised force (nv,), gravity included, in MuJoCo's axes."""
@@ -183,7 +193,13 @@ def _slopes(level: Level, speed: float, shaft_speed: float) -> Array:
         ahead = level.evaluate(speed, v, r, rudder, shaft_speed)
         back = level.evaluate(speed, -v, -r, -rudder, shaft_speed)
         slopes.append((ahead - back)[1:] / (2 * step * speed**2))
-    return np.array(slopes).T
+    # Damping that does not grow with the speed is no lift.
+    return np.array(slopes).T + _linear(level)[1:, 1:] @ ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)) / speed
+
+
+def _linear(level: Level) -> Array:
+    """Linear damping (3, 3) of surge, sway and yaw."""
+    return level.linear_damping[np.ix_((0, 1, 5), (0, 1, 5))]
 
 
 def _fit(
@@ -196,11 +212,12 @@ def _fit(
     """
     forces = np.array([level.evaluate(*state) for state in zip(u, v, r, rudder, n, strict=True)])
     m, x_g, added = level.mass, level.x_g, level.added_mass
-    known_x = (added[1, 1] + m) * v * r + (added[1, 5] + m * x_g) * r * r
+    damped = _linear(level) @ (u, v, r)
+    known_x = (added[1, 1] + m) * v * r + (added[1, 5] + m * x_g) * r * r - damped[0]
     terms_x = np.stack([u * np.abs(u), u**2 * rudder**2, n * np.abs(n), np.abs(n) * u], axis=-1)
     linear = np.stack([u * v, u * r, u**2 * rudder])
     slopes = _slopes(level, speed, float(n.mean()))
-    known_y, known_n = slopes @ linear
+    known_y, known_n = slopes @ linear - damped[1:]
     terms_yn = np.stack([v * np.abs(v), r * np.abs(r)], axis=-1)
     X, Y, N = (
         np.linalg.lstsq(terms, force - known, rcond=None)[0].tolist()
@@ -209,6 +226,7 @@ def _fit(
         )
     )
     (Y_uv, Y_ur, Y_dd), (N_uv, N_ur, N_dd) = slopes.tolist()
+    (X_u, _, _), (_, Y_v, Y_r), (_, N_v, N_r) = (0.0 - _linear(level)).tolist()
     X_ud, Y_vd, Y_rd, N_rd = (-float(added[i, j]) for i, j in ((0, 0), (1, 1), (1, 5), (5, 5)))
     parameters = PlanarParameters(
         m=m, x_g=x_g, I_z=float(level.inertia[2, 2]) + N_rd,
@@ -216,6 +234,7 @@ def _fit(
         X_uu=X[0], X_vr=-Y_vd, X_rr=-Y_rd, X_dd=X[1], X_nn=X[2], X_nu=X[3],
         Y_vv=Y[0], Y_rr=Y[1], Y_uv=Y_uv, Y_ur=Y_ur + m, Y_dd=Y_dd,
         N_vv=N[0], N_rr=N[1], N_uv=N_uv, N_ur=N_ur + m * x_g, N_dd=N_dd,
+        X_u=X_u, Y_v=Y_v, Y_r=Y_r, N_v=N_v, N_r=N_r,
     )  # fmt: skip
     fitted = np.stack([known_x + terms_x @ X, known_y + terms_yn @ Y, known_n + terms_yn @ N], axis=-1)
     inverse = np.linalg.inv(level.inertia)

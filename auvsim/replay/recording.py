@@ -11,6 +11,7 @@ from auvsim.base.frames import Array
 from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog
 from auvsim.navigation.gate import Gate
+from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.navigator import NavigatorSetup
 
 
@@ -43,12 +44,18 @@ class Recording:
     setup: Callable[[Any], NavigatorSetup]  # of an estimator's settings, or of None: those of the run
     own: Any  # settings of the run's own estimator
     vehicle: VehicleLog | None = None  # the log that it is of, where that is a trial's
+    messages: Sequence[Delivery] = ()  # of other vehicles' modems, in order of arrival
 
     @property
     def gate(self) -> Gate:
         """The gate before the estimator, as in the run; in tables, which round, the same value again is no fault."""
         setup = self.setup(None)
         return Gate(setup.sensors, setup.actuation, frozen=self.vehicle is not None)
+
+    @property
+    def message_gate(self) -> MessageGate:
+        """The gate for messages of modems, as in the run."""
+        return MessageGate(self.setup(None).vehicle, self.setup(None).others)
 
     def ticks(self) -> Iterator[Tick]:
         """The updates, with what came between."""
@@ -57,13 +64,16 @@ class Recording:
         ranks = np.array([a.rank for a in self.arrivals])
         order = np.lexsort((np.arange(len(received)), np.where(ranks == DELIVERED, received, 0.0), ranks, looked))
         waiting = [(looked[k], self.arrivals[k]) for k in order if looked[k] < len(self.clock)]
-        ends, start = np.searchsorted(self.clock, self.times), 0
+        handed = np.searchsorted(self.clock, np.array([m.received for m in self.messages]))
+        ends, start, first = np.searchsorted(self.clock, self.times), 0, 0
         for time, end, commands in zip(self.times.tolist(), ends.tolist(), self.commands, strict=True):
             stop = start
             while stop < len(waiting) and waiting[stop][0] <= end:
                 stop += 1
             came, start = [arrival for _, arrival in waiting[start:stop]], stop
-            yield Tick(time, [a.reading for a in came], [a.delivery for a in came if a.delivery], commands)
+            last = int(np.searchsorted(handed, end, side="right"))
+            fixes, heard, first = [a.delivery for a in came if a.delivery], self.messages[first:last], last
+            yield Tick(time, [a.reading for a in came], [*fixes, *heard], commands)
 
 
 DELIVERED = 1_000_000  # rank of what the network delivers

@@ -1,22 +1,25 @@
 """A recording through an estimator."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 from pydantic import TypeAdapter, ValidationError
 
+from auvsim.acoustics.message import Delivery
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.plugins import is_own
 from auvsim.navigation import registry
 from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.navigator import Buffered, Navigator
 from auvsim.navigation.settings import EstimatorSettings
 from auvsim.replay.recording import Recording
 from auvsim.simulation.short import estimator_keys
 from estimators.core.errors import EstimatorError, ParameterError
 from estimators.core.innovations import Innovated, innovations
-from estimators.core.types import Gaussian
+from estimators.core.types import Gaussian, Outcome
 
 LAG = 15.0  # age from which a node of a delay buffer counts as settled [s]
 STRIDE = 10.0  # time between two looks at settled nodes [s]; together less than a buffer keeps
@@ -68,11 +71,13 @@ def replay(recording: Recording, kind: str | None = None, *, smooth: bool = Fals
     if smooth and not isinstance(navigator, Buffered):
         raise InputError(f"estimator '{settings.kind}' keeps no delay buffer; only one that does can be smoothed")
     settled = _Settled(navigator, smooth)
-    estimates, gate = [], recording.gate
+    estimates, gate, message_gate = [], recording.gate, recording.message_gate
     for tick in recording.ticks():
         try:
             readings, gated = gate.passed(tick.readings)
-            estimate = navigator.update(tick.time, readings, tick.messages, tick.commands)
+            messages, refused = _judged(message_gate, tick.messages)
+            estimate = navigator.update(tick.time, readings, messages, tick.commands)
+            gated += refused
             estimates.append(replace(estimate, outcomes=(*gated, *estimate.outcomes)) if gated else estimate)
             settled.look(tick.time)
         except EstimatorError as error:
@@ -88,6 +93,12 @@ def replay(recording: Recording, kind: str | None = None, *, smooth: bool = Fals
         return [found]
     refined = [_refined(e, settled.beliefs.get(e.time), [*states]) for e in estimates]
     return [found, replace(found, estimator=f"{settings.kind}, smoothed", estimates=refined, innovations=[])]
+
+
+def _judged(gate: MessageGate, deliveries: Sequence[Delivery]) -> tuple[list[Delivery], list[Outcome]]:
+    """Messages that may be heard, and the fates of others; a dock's packets are judged as readings."""
+    good, refused = gate.passed([d for d in deliveries if d.message.kind != "usbl"])
+    return [d for d in deliveries if d.message.kind == "usbl"] + good, refused
 
 
 class _Settled:

@@ -14,13 +14,13 @@ from auvsim.base.reading import Reading
 from auvsim.identification import table_records
 from auvsim.identification.columns import read_map
 from auvsim.identification.signals import Signal, Signals
-from auvsim.navigation.measurements import FixSettings
 from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.navigation.settings import ReckoningSettings
 from auvsim.physics import planar_sets
 from auvsim.replay.recording import Arrival, Recording
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.simulation.setups import model_speed
 from auvsim.vehicles import library

@@ -11,7 +11,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.randomness import Noise, stream
 from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog, read
-from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.propulsion import propulsion
 from auvsim.replay.recording import DELIVERED, Arrival, Recording
 from auvsim.simulation import scenario
 from auvsim.simulation.scenario import Scenario
@@ -37,8 +37,7 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
     if not len(times):
         raise InputError(f"{path}: no estimate of '{log.name}' in it; an estimator is replayed at the times it ran")
     speed = model_speed(settings.estimator)
-    shaft_speed = fit_planar_model(settings.model, speed, plan.water.density).shaft_speed_for(settings.start.speed)
-    before = vehicle.actuation.at_speed(shaft_speed)
+    before = propulsion(settings.model, speed, plan.water.density).ahead(settings.start.speed)
     command = log["command"]
     demands = zip(*(command[demand.name].tolist() for demand in vehicle.actuation.demands), strict=True)
     commands = [before, *(type(before)(*values) for values in demands)]
@@ -55,6 +54,7 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
         setup=lambda other: navigator_setup(plan, log.name, vehicle, other),
         own=settings.estimator,
         vehicle=log,
+        messages=list(_messages(log)) if "received" in log else (),
     )
 
 
@@ -73,6 +73,22 @@ def _arrivals(log: VehicleLog, group: str, rank: int, plan: Scenario) -> Iterato
         yield _delivered(log, reading)
         if sequence in copies:
             yield _delivered(log, reading._replace(received=received + copies[sequence]))
+
+
+def _messages(log: VehicleLog) -> Iterator[Delivery]:
+    """The messages of other vehicles' modems."""
+    columns = log["received"]
+    rows = zip(*(columns[name].tolist() for name in columns if name != "payload"), strict=True)
+    names = [name for name in columns if name != "payload"]
+    for values, payload in zip(rows, columns["payload"], strict=True):
+        row = dict(zip(names, values, strict=True))
+        message = Message(
+            row["source"], row["destination"] or None, row["stamp"], row["kind"],
+            tuple(payload[: row["numbers"]].tolist()), row["bits"], row["sequence"],
+            answers=None if row["answers"] < 0 else row["answers"],
+        )  # fmt: skip
+        measured = (None if math.isnan(row[name]) else row[name] for name in ("range", "bearing"))
+        yield Delivery(message, row["time"], *measured, row["arrived"])
 
 
 def _delivered(log: VehicleLog, reading: Reading) -> Arrival:

@@ -12,13 +12,14 @@ from auvsim.sensors.compass import Compass
 from auvsim.sensors.depth import Depth
 from auvsim.sensors.dvl import Dvl
 from auvsim.sensors.feedback import Feedback
+from auvsim.sensors.fix import Fix
 from auvsim.sensors.gyro import Gyro
 from auvsim.sensors.range import Range
 from auvsim.sensors.sensor import Sensor
 from auvsim.vehicles.library import Vehicle
 
 STANDARD: tuple[type[Sensor], ...] = (Compass, Depth, Feedback, Dvl, Gyro)  # every vehicle has settings for them
-SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range)}
+SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range, Fix)}
 
 
 def find(kind: str) -> Callable[..., Sensor]:

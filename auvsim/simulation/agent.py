@@ -4,22 +4,25 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol
 
+import numpy as np
 from numpy.random import Generator
 
-from auvsim.acoustics.message import Delivery
+from auvsim.acoustics.message import Delivery, Outgoing
+from auvsim.acoustics.payload import StateReport
 from auvsim.base import plugins
 from auvsim.base.reading import Reading
 from auvsim.control import registry as controllers
 from auvsim.control.controller import ControllerSetup
-from auvsim.data.variables import Group, Table, Variable, vehicle_groups
+from auvsim.data.variables import PAYLOAD, Group, Table, Variable, vehicle_groups
 from auvsim.missions import registry as missions
 from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
 from auvsim.navigation.gate import Gate
+from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.navigator import Navigator
-from auvsim.physics.planar_fit import fit_planar_model
+from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
 from auvsim.sensors.range import RangeSettings
@@ -80,10 +83,9 @@ class Agent:
         self.name, self.vehicle = name, vehicle
         settings, rates, density = plan.vehicles[name], plan.rates, plan.water.density
         start = settings.start
-        # The shaft speed of a command is always that of the fitted model, so that runs differ in nothing but the
+        # The drive of a command is always that of the vehicle's own model, so that runs differ in nothing but the
         # estimator.
-        fitted = fit_planar_model(settings.model, model_speed(settings.estimator), density)
-        self.shaft_speed = fitted.shaft_speed_for
+        ahead, holds = propulsion(settings.model, model_speed(settings.estimator), density)
         heading = math.radians(start.heading_deg)
         self.dock = usbl_dock(plan, name)
         self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does
@@ -96,22 +98,25 @@ class Agent:
                 heading=heading,
                 depth=start.depth,
                 period=1.0 / rates.control,
-                holds=lambda speed: fitted.shaft_speed_for(speed) <= vehicle.actuation.shaft_limit,
+                holds=holds,
                 structures=places,
                 usbl=self.serves,
                 ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
             ),
         )
-        self.navigator = navigator or estimators.build(navigator_setup(plan, name, vehicle))
+        setup = navigator_setup(plan, name, vehicle)
+        self.navigator = navigator or estimators.build(setup)
+        self.messages = MessageGate(name, setup.others) if setup.modem else None  # the gate for them
         self.controller = controllers.build(
             settings.control.kind,
             ControllerSetup(
                 settings=settings.control,
                 actuation=vehicle.actuation,
-                shaft_speed=fitted.shaft_speed_for,
+                ahead=ahead,
                 period=1.0 / rates.control,
             ),
         )
+        self._locate = getattr(self.controller, "locate", None)  # of one that steers by the estimate
         self.sensors = [
             (
                 _sensor(key, found, noise(key), vehicle),
@@ -127,7 +132,7 @@ class Agent:
         self._mission = Part("mission", "" if mission else settings.mission.kind, name)
         self._controller = Part("controller", settings.control.kind, name)
         self.estimate: Estimate | None = None
-        self.commands: Any = vehicle.actuation.at_speed(fitted.shaft_speed_for(start.speed))
+        self.commands: Any = ahead(start.speed)
         self._filter_ticks = round(rates.control / rates.filter)
         self._readings: list[Reading] = []  # of this control period
         self._messages: list[Delivery] = []
@@ -139,6 +144,7 @@ class Agent:
         self.over = False
         self._running = self._controller  # the part whose code runs now, to blame for what it raises
         self._demands = tuple(demand.name for demand in vehicle.actuation.demands)
+        self._received = f"vehicles/{name}/received"
         groups = ("estimate", "measurements", "mission", "command")
         self._estimates, self._measurements, self._decisions, self._commands = (f"vehicles/{name}/{g}" for g in groups)
 
@@ -161,6 +167,7 @@ class Agent:
             demands={d.name: Variable((), "float64", d.units, d.long_name) for d in actuation.demands},
             channels=dict(zip(actuation.channels, actuation.units, strict=True)),
             states=self.navigator.states,
+            modem=self.messages is not None,
         )
 
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
@@ -188,12 +195,61 @@ class Agent:
                 text = f"{reading.sensor} is heard again; {count} reading{'s' * (count > 1)} refused"
                 log.event(truth.time, self.name, "heard", text)
 
-    def receive(self, deliveries: Sequence[Delivery]) -> None:
+    def receive(self, deliveries: Sequence[Delivery], time: float, log: Log) -> None:
         """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
+        heard = []
         for delivery in deliveries:
-            self._messages.append(delivery)
             if delivery.message.kind == "usbl":
+                self._messages.append(delivery)
                 self._readings.append(delivery.message.payload.reading._replace(received=delivery.received))
+            else:
+                log.append(self._received, received_row(delivery))
+                heard.append(delivery)
+        if not heard or self.messages is None:
+            return
+        suspect = dict(self.messages.refused)
+        good, refused = self.messages.passed(heard)
+        self._messages += good
+        self._gated += refused
+        for outcome in refused:
+            if outcome.source not in suspect:
+                text = f"messages of {outcome.source}: {outcome.reason.replace('_', ' ')}"
+                log.event(time, self.name, "refused", text)
+        for delivery in good if suspect else ():
+            if (count := self.messages.refused.pop(delivery.message.source, 0)) > 0:
+                text = f"{delivery.message.source} is heard again; {count} message{'s' * (count > 1)} refused"
+                log.event(time, self.name, "heard", text)
+
+    def report(self, time: float, stamp: float) -> StateReport | None:
+        """What the vehicle tells others: its estimate, moved on to a time [s] and stamped; None before there is one."""
+        e = self.estimate
+        if e is None or not e.initialised:
+            return None
+        dt = time - e.time
+        surge, sway, yaw_rate = e.velocity.tolist()
+        cos, sin = math.cos(e.heading), math.sin(e.heading)
+        north = surge * cos - sway * sin + float(e.current[0])
+        east = surge * sin + sway * cos + float(e.current[1])
+        own = [*self.navigator.states]
+        index = [0, 1, own.index("heading")] if "heading" in own else [0, 1]
+        P = [[0.0] * 3 for _ in range(3)]
+        for row, i in enumerate(index):
+            for column, j in enumerate(index):
+                P[row][column] = float(e.covariance[i, j])
+        position = e.position.tolist()
+        return StateReport(
+            stamp, position[0] + north * dt, position[1] + east * dt, position[2], e.heading + yaw_rate * dt,
+            north, east, yaw_rate, P[0][0], P[0][1], P[0][2], P[1][1], P[1][2], P[2][2],
+        )  # fmt: skip
+
+    def outgoing(self) -> list[Outgoing]:
+        """Takes what the mission wants to send."""
+        outbox = getattr(self.mission, "outbox", None)  # a mission of the user's own may have none
+        if not outbox:
+            return []
+        sent = list(outbox)
+        outbox.clear()
+        return sent
 
     def navigate(self, ticks: int, time: float, log: Log) -> None:
         """Hands all that arrived to the controller and, when it is due, to the estimator."""
@@ -214,6 +270,9 @@ class Agent:
         for kind, text in estimator_events(self.estimate, e):
             log.event(time, self.name, kind, text)
         self.estimate = e
+        if self._locate is not None:
+            self._running = self._controller
+            self._locate(e)
         views = (e.position, e.heading, e.velocity, e.current)
         log.append(self._estimates, (e.time, e.state, e.covariance, *views, e.initialised, e.refused))
         outcomes, self._gated = (*self._gated, *e.outcomes), []
@@ -270,6 +329,19 @@ class Agent:
             return str(self.mission.overdue(duration))
         except Exception as error:
             raise self._mission.blamed(error) from error.__cause__
+
+
+def received_row(delivery: Delivery) -> tuple[Any, ...]:
+    """The row of the group `received` for a message of a modem."""
+    m = delivery.message
+    payload = np.full(PAYLOAD, math.nan)
+    payload[: len(m.payload)] = m.payload
+    nothing = math.nan
+    return (
+        delivery.received, m.source, m.destination or "", m.kind, m.sequence, -1 if m.answers is None else m.answers,
+        m.sent, delivery.arrived, nothing if delivery.range is None else delivery.range,
+        nothing if delivery.bearing is None else delivery.bearing, m.bits, len(m.payload), payload,
+    )  # fmt: skip
 
 
 def _sensor(name: str, settings: Any, generator: Generator, vehicle: Vehicle) -> sensors.Sensor:

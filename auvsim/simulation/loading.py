@@ -6,7 +6,7 @@ from typing import Any
 
 import auvsim
 from auvsim.base.errors import InputError
-from auvsim.simulation import sampling
+from auvsim.simulation import controllers, sampling
 from auvsim.simulation.scenario import Scenario, parse
 
 SHIPPED = Path(auvsim.__file__).parent / "scenarios"
@@ -39,9 +39,9 @@ def plan_of(path: Path | None, pinned: Mapping, base: Mapping | None = None) -> 
         InputError: the file cannot be read.
     """
     given, places = ({}, {}) if path is None else sampling.load_plan(path)
-    whole = "vehicles" in given
-    plan = given if whole else sampling.merge(sampling.default_plan() if base is None else dict(base), given)
-    return sampling.merge(plan, pinned), places
+    if "vehicles" in given:
+        return controllers.in_full(sampling.merge(given, pinned)), places
+    return controllers.layered(sampling.default_plan() if base is None else base, given, pinned), places
 
 
 def find(name: str) -> Path:

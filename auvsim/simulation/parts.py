@@ -9,6 +9,7 @@ import numpy as np
 from auvsim.base import plugins
 from auvsim.base.errors import DivergenceError
 from auvsim.base.reading import Reading
+from auvsim.control.controller import Station
 from auvsim.data.variables import Variable, size_of
 from auvsim.missions.mission import Event, Mission
 from auvsim.navigation.estimate import Estimate
@@ -95,8 +96,12 @@ def mission(made: Mission, wanted: Any) -> None:
     """
     if not isinstance(wanted, tuple) or len(wanted) != 4:
         raise TypeError(f"update gave a {type(wanted).__name__}, not Setpoints")
-    heading, depth, speed, rudder = wanted
-    _numbers(depth=depth, speed=speed, **({"heading": heading} if rudder is None else {"rudder": rudder}))
+    heading, depth, speed, last = wanted
+    if isinstance(wanted, Station):
+        steered = {"heading": heading, "north": last[0], "east": last[1]}
+    else:
+        steered = {"heading": heading} if last is None else {"rudder": last}
+    _numbers(depth=depth, speed=speed, **steered)
     if not 0 <= made.phase < len(made.phases):
         raise ValueError(f"phase is {made.phase!r}, not one of the {len(made.phases)}: {', '.join(made.phases)}")
     row, variables = made.row(), made.variables

@@ -9,7 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
+from auvsim.acoustics.channel import DELIVERED
 from auvsim.acoustics.link import Channel
+from auvsim.acoustics.message import Fate, Outgoing
+from auvsim.acoustics.modems import Equipment, Modems, build_modems
 from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
 from auvsim.base.errors import DivergenceError
@@ -92,6 +95,7 @@ def run(
             status = "interrupted"
             log.event(simulation.time, "", "interrupted", "stopped by the user")
         simulation.log_contacts()
+        simulation.log_under_way()
         return log.finish(status, wall_time=wall.perf_counter() - started)
 
 
@@ -147,7 +151,8 @@ class Simulation:
         links = {
             usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
         }
-        self.network = Network(links, self._usbl)
+        self.network = Network(links, self._usbl, self._modems(lambda source: stream(seed, trial, source)))
+        self._fates: dict[tuple[str, str], str] = {}  # the last one, by sender and receiver
         self._physics_ticks = round(rates.physics / rates.control)
         self._log_ticks = max(1, round(rates.control / rates.log))
         self.progress_ticks = round(6.0 * rates.control)
@@ -211,23 +216,68 @@ class Simulation:
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
             )
-            m = fate.message
-            log.append(
-                "network/messages", (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
-            )
+            self._log_fate(fate)
+        if self.network.modems:
+            for fate in self.network.modems.advance(before, self.truths):
+                self._log_fate(fate)
+                self._report_loss(fate, time)
         try:
             for agent in self.agents:
-                agent.receive(self.network.deliver(agent.name, time))
+                agent.receive(self.network.deliver(agent.name, time), time, log)
                 agent.navigate(self.ticks, time, log)
                 demand = agent.act(time, world.latched(agent.name), log)
                 if demand is not None:
                     if self._listeners:
                         self._report_approach(agent)
                     world.command(agent.name, agent.vehicle.actuation.allocate(demand))
+                for outgoing in agent.outgoing():
+                    self._post(agent.name, outgoing, time)
         except (Exception, SystemExit) as error:
             raise agent.blame(error) from error.__cause__
         if self.ticks % self._log_ticks == 0:
             self._record_truths()
+
+    def log_under_way(self) -> None:
+        """Logs the packets that are still under way."""
+        for fate in self.network.modems.under_way() if self.network.modems else ():
+            self._log_fate(fate)
+
+    def _modems(self, noise: Callable[[str], Generator]) -> Modems | None:
+        """The modems of the vehicles that have one."""
+        plan, agents = self.scenario, {agent.name: agent for agent in self.agents}
+        equipment = {name: Equipment(v.modem, v.clock) for name, v in plan.vehicles.items() if v.modem}
+        if not equipment:
+            return None
+        medium = plan.network.medium(getattr(self.world, "terrain", plan.world.floor).depth, plan.water.sea_floor)
+
+        def report(name: str, time: float, stamp: float) -> Any:
+            return agents[name].report(time, stamp)
+
+        return build_modems(plan.network, equipment, medium, noise, report, 1.0 / plan.rates.control)
+
+    def _post(self, name: str, outgoing: Outgoing, time: float) -> None:
+        fate: Fate | None = None
+        if self.network.modems:
+            fate = self.network.modems.post(name, outgoing)
+        elif not self._stretches.begins(time, name, "mute"):
+            return
+        else:
+            self.log.event(time, name, "mute", "the mission wants to send, but the vehicle has no modem")
+        if fate is not None:
+            self._log_fate(fate._replace(message=fate.message._replace(sent=time)))
+            self._report_loss(fate, time)
+
+    def _log_fate(self, fate: Fate) -> None:
+        m = fate.message
+        row = (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
+        self.log.append("network/messages", row)
+
+    def _report_loss(self, fate: Fate, time: float) -> None:
+        """Logs where a receiver begins to lose the packets of a sender for a reason."""
+        link = (fate.message.source, fate.destination)
+        before, self._fates[link] = self._fates.get(link), fate.fate
+        if fate.fate not in (DELIVERED, before):
+            self.log.event(time, fate.destination, "lost", f"packet of {link[0]}: {fate.fate}")
 
     def _report_limits(self, time: float) -> None:
         """Logs vehicles that come out of the water or touch the sea floor."""

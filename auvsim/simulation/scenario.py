@@ -7,7 +7,10 @@ from typing import Annotated, Any
 
 from pydantic import Field, StringConstraints, ValidationError, model_validator
 
+from auvsim.acoustics.clock import ClockSettings
 from auvsim.acoustics.link import AcousticSettings
+from auvsim.acoustics.modem import ModemSettings
+from auvsim.acoustics.modems import SoundSettings
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
@@ -83,6 +86,8 @@ class VehicleSettings(Settings):
     estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
     mission: MissionSettings = Field(default=DockingSettings(), description="The mission, by its `kind`.")
+    modem: ModemSettings | None = Field(default=None, description="acoustic modem; none: it has none")
+    clock: ClockSettings = ClockSettings()
 
 
 class StructureSettings(Settings):
@@ -123,8 +128,8 @@ class PhysicsSettings(Settings):
     )
 
 
-class NetworkSettings(Settings):
-    """What carries messages."""
+class NetworkSettings(SoundSettings):
+    """What carries messages: the water for modems, and the link of a dock's USBL."""
 
     acoustics: AcousticSettings = AcousticSettings()
 

@@ -6,6 +6,7 @@ from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.physics import planar_sets
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board, rated
+from auvsim.vehicles.actuation import Thrusters
 from auvsim.vehicles.library import Vehicle
 
 
@@ -36,11 +37,16 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
     return NavigatorSetup(
         vehicle=name,
         settings=assumed,
-        parameters=planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density),
+        parameters=None
+        if isinstance(vehicle.actuation, Thrusters)
+        else planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density),
         actuation=vehicle.actuation,
         period=1.0 / plan.rates.filter,
         rates=dict(rated(own.sensors)),
         usbl=own.sensors.usbl,
         dock=plan.structures[dock].pose if dock else None,
         sensors=dict(on_board(own.sensors)),
+        modem=own.modem,
+        others=tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name),
+        start=plan.start_position(name)[:2],
     )

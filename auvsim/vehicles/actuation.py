@@ -216,15 +216,14 @@ class Thrusters:
     def _inverse(self) -> Array:
         return np.asarray(np.linalg.pinv(self.matrix), dtype=np.float64)
 
-    def at_speed(self, shaft_speed: float) -> Wrench:
-        """No force: a thruster-driven vehicle has no shaft to hold a speed with."""
-        return Wrench(0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    def shares(self, demand: Sequence[float] | Array) -> Array:
+        """Thrusts (n,) that a wrench (6,) asks for, as shares of the largest to that side; above 1 it is too much."""
+        thrusts = self._inverse @ np.asarray(demand, dtype=float)
+        return np.abs(thrusts) / np.where(thrusts >= 0.0, self.thrust[:, 0], self.thrust[:, 1])
 
     def allocate(self, demand: Sequence[float]) -> list[float]:
         """Commands of the n thrusters, -1 to 1, that carry out a wrench (6,)."""
-        thrusts = self._inverse @ np.asarray(demand, dtype=float)
-        full = np.where(thrusts >= 0.0, self.thrust[:, 0], self.thrust[:, 1])
-        shares = np.abs(thrusts) / full
+        thrusts, shares = self._inverse @ np.asarray(demand, dtype=float), self.shares(demand)
         shares /= max(1.0, float(shares.max()))
         rate = np.sqrt(shares)
         return (np.sign(thrusts) * np.where(rate > 0.0, self.dead_band + (1.0 - self.dead_band) * rate, 0.0)).tolist()

@@ -255,8 +255,9 @@ def _thrusters(root: Any, name: str) -> Thrusters:
             raise InputError(f"model {name}: give the attitude of thruster '{channel}' as quat")
         direction = flip(_ahead(quaternion / np.linalg.norm(quaternion)))
         columns.append(np.concatenate([direction, np.cross(place, direction)]))
-        thrust.append(_numeric(root, name, f"{channel}_thrust"))
-        band = root.find("numeric", f"{channel}_dead_band")
+        common = root.find("numeric", f"{channel}_thrust") is None
+        thrust.append(_numeric(root, name, "thruster_thrust" if common else f"{channel}_thrust"))
+        band = root.find("numeric", f"{channel}_dead_band") or root.find("numeric", "thruster_dead_band")
         dead.append(0.0 if band is None else float(np.ravel(band.data)[0]))
         lag = _attribute(root.find("actuator", channel), "dynprm")
         lags.append(0.0 if lag is None else float(np.ravel(lag)[0]))

@@ -76,12 +76,17 @@ class Playback:
         self._refusals = sorted(told)
         self._joints = {name: self._addresses(name) for name in self.motions}
 
-    def _addresses(self, name: str) -> tuple[int, list[int], Array]:
-        """Where in qpos a vehicle and its actuators are, and which of these turn on and on (n,)."""
-        actuation = self._vehicles[name].actuation
-        driven = [int(self.model.actuator(f"{name}/{channel}").trnid[0]) for channel in actuation.channels]
-        turning = np.array([unit == "rad/s" for unit in actuation.units])
-        return int(self.model.joint(f"{name}/").qposadr[0]), [int(self.model.jnt_qposadr[j]) for j in driven], turning
+    def _addresses(self, name: str) -> tuple[int, list[int], list[int], Array]:
+        """Where in qpos a vehicle and its hinges are, their channels, and which of these turn on and on (n,).
+
+        Thrusters turn no hinge.
+        """
+        actuation, model = self._vehicles[name].actuation, self.model
+        actuators = [model.actuator(f"{name}/{channel}") for channel in actuation.channels]
+        hinged = [k for k, a in enumerate(actuators) if model.actuator_trntype[a.id] == mujoco.mjtTrn.mjTRN_JOINT]
+        places = [int(model.jnt_qposadr[int(actuators[k].trnid[0])]) for k in hinged]
+        turning = np.array([actuation.units[k] == "rad/s" for k in hinged], dtype=bool)
+        return int(model.joint(f"{name}/").qposadr[0]), places, hinged, turning
 
     @property
     def lone(self) -> bool:
@@ -131,9 +136,9 @@ class Playback:
         """Puts the scene's bodies where they are at that moment."""
         qpos = self.data.qpos
         for name, now in moment.vehicles.items():
-            free, joints, turning = self._joints[name]
+            free, joints, channels, turning = self._joints[name]
             qpos[free : free + 3], qpos[free + 3 : free + 7] = now.position, now.quaternion
-            qpos[joints] = np.where(turning, now.turns, now.actuators)
+            qpos[joints] = np.where(turning, now.turns[channels], now.actuators[channels])
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_camlight(self.model, self.data)

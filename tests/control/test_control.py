@@ -31,7 +31,7 @@ def setup(settings: AutopilotSettings) -> ControllerSetup:
     matrix = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0], [0.0, 1.0]])
     actuation = FinsAndShaft(fins=("a", "b", "c", "d"), matrix=matrix, limits=limits, lags=np.zeros(5))
     return ControllerSetup(
-        settings=settings, actuation=actuation, shaft_speed=lambda speed: 80.0 * speed, period=PERIOD
+        settings=settings, actuation=actuation, ahead=lambda speed: actuation.at_speed(80.0 * speed), period=PERIOD
     )
 
 
@@ -150,7 +150,10 @@ def sail(
     world = World(scenes.scene({"auv": "remus100"}, {}, WorldSettings(sea_floor=80.0), 100.0), Uniform(current))
     fitted = planar_fit.fit_planar_model("remus100", 1.0)
     made = ControllerSetup(
-        settings=AutopilotSettings(), actuation=vehicle.actuation, shaft_speed=fitted.shaft_speed_for, period=PERIOD
+        settings=AutopilotSettings(),
+        actuation=vehicle.actuation,
+        ahead=lambda speed: vehicle.actuation.at_speed(fitted.shaft_speed_for(speed)),
+        period=PERIOD,
     )
     pilot = Autopilot(made)
     compass, gauge = Compass(sensors[0], stream(seed, 0, "compass")), Depth(sensors[1], stream(seed, 0, "depth"))

@@ -61,7 +61,7 @@ WRONG: dict[str, tuple[Callable[[Table], Table], str]] = {
     "time that goes back": (
         lambda t: {**t, "time [s]": np.where(np.isclose(t["time [s]"], 40.0), 31.0, t["time [s]"])}, "sort the rows"),
     "no rudder": (lambda t: without(t, "rudder"), "no column is the rudder"),
-    "no heading": (lambda t: without(t, "heading", "yaw_rate"), "neither heading nor yaw rate"),
+    "no heading": (lambda t: without(t, "heading", "yaw_rate"), "no column is the heading or yaw rate"),
     "two headings": (lambda t: {**t, "psi [rad]": t["time [s]"]}, "are both heading"),
     "shaft that stands still": (lambda t: {**t, "n [rpm]": 0.0 * t["n [rpm]"]}, "the shaft stands still"),
     "a unit that is none": (lambda t: renamed(t, "surge [m/s]", "surge [furlong]"), "'furlong' is no unit of surge"),

@@ -14,7 +14,7 @@ from auvsim.base.errors import InputError
 from auvsim.identification import judgement, pictures, pipeline, product, report
 from auvsim.identification.fit import DEFAULT_FREE, with_values
 from auvsim.identification.pipeline import Identification, identify
-from auvsim.identification.records import Readings, Record
+from auvsim.identification.records import MEASURED, Readings, Record
 from auvsim.identification.segments import SegmentOptions
 from auvsim.identification.simulated import Kind, Vessel, simulate
 from auvsim.physics import planar_sets
@@ -64,6 +64,29 @@ def test_a_fit_of_good_data_predicts_what_was_held_out(found: Identification) ->
     # The rudder goes the shortest way in the turns.
     assert [judged.record.kind for judged in found.judged] == ["turns"]
     assert {r.kind for r in found.fitted} == {"multisine", "zigzag"}
+
+
+def test_no_fit_is_left_that_is_far_off_or_unfinished(found: Identification) -> None:
+    """Beyond limits on what was held out, on residuals, and without convergence: each with what to look at."""
+    assert found.doubts == ()
+    fit = found.fit
+    unfinished = replace(found, fits=(*found.fits[:-1], replace(fit, converged=False, message="ran away")))
+    assert len(unfinished.doubts) == 1
+    assert "has not converged (ran away)" in unfinished.doubts[0]
+    residuals = np.where(np.arange(len(fit.residual_rms)) == MEASURED.index("sway"), 57.0, fit.residual_rms)
+    (said,) = replace(found, fits=(*found.fits[:-1], replace(fit, residual_rms=residuals))).doubts
+    assert said.startswith("sway is 57 standard deviations off")
+    # One held-out record of which the fit leaves 1777 %, its start still more.
+    far = [replace(p, errors=p.errors + 17.77 * p.distance[-1]) for p in found.judged[0].fit]
+    farther = [replace(p, errors=p.errors + 40.0 * p.distance[-1]) for p in found.judged[0].start]
+    judged = (replace(found.judged[0], fit=tuple(far), start=tuple(farther)),)
+    (said,) = replace(found, judged=judged).doubts
+    assert "% of the distance run on what was held out, more than 25%" in said
+
+
+def test_the_mass_that_is_taken_stands_first(found: Identification) -> None:
+    """Whose data are a heavier vehicle's sees it in the first line."""
+    assert f"a vehicle of {TRUE.m:.4g} kg, as remus100 has" in found.verdicts[0].text
 
 
 def test_the_truth_lies_in_the_intervals(found: Identification) -> None:

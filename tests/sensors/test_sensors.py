@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import binom, chi2, kstest
 from surroundings import WATER
 
-from auvsim.acoustics.usbl import StructurePose, Usbl, UsblSettings, interpolate
+from auvsim.acoustics.motion import interpolate
+from auvsim.acoustics.usbl import StructurePose, Usbl, UsblSettings
 from auvsim.base.frames import euler_to_quaternion
 from auvsim.base.randomness import stream
 from auvsim.physics.truth import Truth

@@ -53,7 +53,9 @@ def test_an_unknown_name_lists_what_there_is():
     with pytest.raises(InputError, match=r"^no vehicle 'remus'; there are .*remus100") as caught:
         library.vehicle("remus")
     assert "dock" not in str(caught.value)
-    with pytest.raises(InputError, match=r"^no structure 'remus100x'; there are dock, dock_tube$"):
+    with pytest.raises(
+        InputError, match=r"^no structure 'remus100x'; there are dock, dock_cage, dock_lauv, dock_tube$"
+    ):
         library.structure("remus100x")
 
 

@@ -7,7 +7,7 @@ import pytest
 from auvsim.base.errors import InputError
 from auvsim.base.frames import FLIP6
 from auvsim.cli import main
-from auvsim.control.hovering import Hovering, HoveringGains
+from auvsim.control.hovering import Hovering, HoveringSettings
 from auvsim.physics import planar_fit, scenes, soundness
 from auvsim.physics.scenes import WorldSettings
 from auvsim.physics.world import World
@@ -81,7 +81,7 @@ def test_it_drags_as_the_paper_says():
     """At 40 N ahead it settles where 13.7 u + 141 u^2 is 40 N."""
     found = world()
     found.place("rov", np.array([0.0, 0.0, 15.0]), 0.0, 0.4, [0.0] * 8)
-    hover = Hovering(HoveringGains(), 0.1)
+    hover = Hovering(HoveringSettings(), 0.1)
     for _ in range(300):
         truth = found.truth("rov")
         held = hover.command(np.array([0.0, 0.0, 15.0 - truth.position[2]]), truth.attitude, truth.nu, 0.0)
@@ -95,7 +95,7 @@ def test_it_drags_as_the_paper_says():
 def test_it_holds_station_in_a_current(towards):
     """0.3 m/s, from 2.4 m away, by its true state: within a centimetre after half a minute, level, on its heading."""
     found = world((0.3 * np.cos(towards), 0.3 * np.sin(towards), 0.0))
-    goal, hover, errors = np.array([1.0, -2.0, 10.0]), Hovering(HoveringGains(), 0.1), []
+    goal, hover, errors = np.array([1.0, -2.0, 10.0]), Hovering(HoveringSettings(), 0.1), []
     found.place("rov", np.array([0.0, 0.0, 9.0]), 0.5, 0.0, [0.0] * 8)
     for _ in range(600):
         truth = found.truth("rov")
@@ -112,7 +112,7 @@ def test_it_holds_station_in_a_current(towards):
 
 def test_without_its_integral_it_is_carried_off():
     """By drag over gain, (13.7 + 141 x 0.3) x 0.3 / 60 m in a current from ahead."""
-    found, hover = world((-0.3, 0.0, 0.0)), Hovering(HoveringGains(integral=(0.0, 0.0, 0.0)), 0.1)
+    found, hover = world((-0.3, 0.0, 0.0)), Hovering(HoveringSettings(integral=(0.0, 0.0, 0.0)), 0.1)
     found.place("rov", np.array([0.0, 0.0, 9.0]), 0.0, 0.0, [0.0] * 8)
     for _ in range(600):
         truth = found.truth("rov")

@@ -21,8 +21,10 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
         raise InputError(f"the log of '{log.name}' lacks 'mission_settings', which says what its track is")
     settings = yaml_text.read(str(log.attributes["mission_settings"]), "log").value
     pattern = settings["pattern"]
-    kind = patterns.LawnMower if pattern["kind"] == "lawn_mower" else patterns.Waypoints
-    points = patterns.points(kind(**pattern))
+    way: Any = patterns.KINDS[pattern["kind"]](**pattern)
+    if isinstance(way, patterns.Weave | patterns.Circle):
+        return {"finished": bool((mission["phase"] == 2).any()), "waypoints": 0, "cross_track_rms": None}
+    points = patterns.points(way)
     reached = int((log["event"]["kind"] == "waypoint").sum())
     under_way = np.flatnonzero(mission["phase"] == 1)
     squares = []
@@ -31,11 +33,11 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
         first, last = mission["time"][under_way[[0, -1]]]
         for leg in range(1, len(points)):
             part = (ahead == leg) & (truth["time"] >= first) & (truth["time"] <= last)
-            begin, way = points[leg - 1], points[leg] - points[leg - 1]
-            if not way.any():
+            begin, along = points[leg - 1], points[leg] - points[leg - 1]
+            if not along.any():
                 continue  # a waypoint given twice is no leg
             off = truth["position"][part, :2] - begin
-            squares.append(((way[0] * off[:, 1] - way[1] * off[:, 0]) / math.hypot(*way)) ** 2)
+            squares.append(((along[0] * off[:, 1] - along[1] * off[:, 0]) / math.hypot(*along)) ** 2)
     all_squares = np.concatenate(squares) if squares else np.empty(0)
     return {
         "finished": reached == len(points),

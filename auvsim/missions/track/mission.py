@@ -1,4 +1,4 @@
-"""A track as a mission: from waypoint to waypoint by line of sight, on the estimate."""
+"""A track as a mission: from waypoint to waypoint by line of sight, on the estimate; or a heading in time."""
 
 import math
 from typing import Any, ClassVar, Literal
@@ -13,24 +13,30 @@ from auvsim.data.variables import Variable
 from auvsim.missions.line_of_sight import course_to_line, cross_track, heading_for_course
 from auvsim.missions.mission import Event, Metric, Mission, MissionSetup, Situation
 from auvsim.missions.track.metrics import track_metrics
-from auvsim.missions.track.patterns import Pattern, Waypoints, points
+from auvsim.missions.track.patterns import Circle, Pattern, Waypoints, Weave, heading, points
 
 SEARCH, UNDER_WAY, DONE = range(3)
 
 
 class TrackSettings(Settings):
-    """A track: waypoints or lanes at one depth."""
+    """A track at one depth: waypoints, lanes, or headings in time."""
 
     kind: Literal["track"] = "track"
-    pattern: Pattern = Field(default=Waypoints(), description="The waypoints, by their `kind`.")
+    pattern: Pattern = Field(default=Waypoints(), description="The way, by its `kind`.")
     depth: float = Field(default=10.0, gt=0, description="depth [m]")
     speed: float = Field(default=1.5, gt=0, description="speed through the water [m/s]")
     lookahead: float = Field(default=15.0, gt=0, description="lookahead of the line of sight [m]")
     radius: float = Field(default=10.0, gt=0, description="distance at which a waypoint counts as reached [m]")
+    lasts: float | None = Field(
+        default=None, gt=0, description="duration of a weave or a circle; none: to the end of the run [s]"
+    )
 
 
 class Track(Mission):
-    """Follows the legs between waypoints; the first leg begins where the vehicle first knows its position."""
+    """Follows the legs between waypoints, of which the first begins where the vehicle first knows its position.
+
+    Headings in time are followed from the start, whether a position is known or not.
+    """
 
     Settings = TrackSettings
     phases = ("search", "under_way", "done")
@@ -48,7 +54,10 @@ class Track(Mission):
     def __init__(self, setup: MissionSetup) -> None:
         super().__init__(setup)
         self._s: TrackSettings = setup.settings
-        self._points = points(self._s.pattern)
+        pattern = self._s.pattern
+        self._law = pattern if isinstance(pattern, Weave | Circle) else None
+        self._points = np.empty((0, 2)) if isinstance(pattern, Weave | Circle) else points(pattern)
+        self._begin: float | None = None  # of headings in time [s]
         self._hold = setup.heading
         self._from: tuple[float, float] | None = None  # begin of the leg [m]
         self.waypoint, self.cross = 0, math.nan
@@ -58,6 +67,8 @@ class Track(Mission):
         s, estimate = self._s, now.estimate
         if self.phase == DONE:
             return Setpoints(now.heading, s.depth, 0.0)
+        if self._law is not None:
+            return self._by_law(self._law, now.time)
         if estimate is None or not estimate.initialised:
             return Setpoints(self._hold, s.depth, s.speed)
         north, east, current = _position_now(now)
@@ -81,12 +92,30 @@ class Track(Mission):
 
     def row(self) -> tuple[Any, ...]:
         """Waypoint ahead and distance from the leg."""
-        return min(self.waypoint, len(self._points) - 1), self.cross
+        return max(0, min(self.waypoint, len(self._points) - 1)), self.cross
+
+    def overdue(self, duration: float) -> str:
+        """Text for the log."""
+        endless = self._law is not None and self._s.lasts is None
+        return f"under way to the end at {duration:g} s" if endless else super().overdue(duration)
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
         """Metrics of the track."""
         return track_metrics(log)
+
+    def _by_law(self, law: Weave | Circle, time: float) -> Setpoints:
+        s = self._s
+        if self._begin is None:
+            self._begin = time
+            self._enter(UNDER_WAY, time, law.kind)
+        since = time - self._begin
+        wanted = heading(law, since, s.speed)
+        if s.lasts is not None and since >= s.lasts:
+            self._enter(DONE, time, f"{law.kind} of {s.lasts:g} s")
+            self.finished = True
+            return Setpoints(wanted, s.depth, 0.0)
+        return Setpoints(wanted, s.depth, s.speed)
 
     def _is_past(self, north: float, east: float) -> bool:
         """Whether the vehicle has passed the waypoint ahead abeam."""

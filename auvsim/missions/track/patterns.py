@@ -1,4 +1,4 @@
-"""Settings of tracks, and their waypoints."""
+"""Settings of tracks, their waypoints, and the headings of those that are none of waypoints."""
 
 import math
 from typing import Annotated, Literal
@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Discriminator, Field, Tag
 
-from auvsim.base.frames import Array
+from auvsim.base.frames import Array, wrap
 from auvsim.base.settings import Settings, tag_by_kind
 
 
@@ -31,10 +31,49 @@ class LawnMower(Settings):
     side: Literal["starboard", "port"] = Field(default="starboard", description="side of the other lanes")
 
 
+class Weave(Settings):
+    """A heading that swings about a course, which needs no position: course + amplitude sin(2 pi t / period + phase)."""
+
+    kind: Literal["weave"] = "weave"
+    course_deg: float = Field(default=0.0, description="mean heading, clockwise from north [deg]")
+    amplitude_deg: float = Field(default=40.0, ge=0.0, le=180.0, description="amplitude of the swing [deg]")
+    swing: float = Field(default=300.0, ge=1.0, description="period of the swing [s]")
+    phase_deg: float = Field(default=0.0, description="phase at the start; 90 begins at the greatest heading [deg]")
+
+
+class Circle(Settings):
+    """A steady turn, which needs no position; its circle drifts with the current."""
+
+    kind: Literal["circle"] = "circle"
+    heading_deg: float = Field(default=0.0, description="heading at the start, clockwise from north [deg]")
+    radius: float = Field(default=100.0, gt=0.0, description="radius through the water [m]")
+    side: Literal["starboard", "port"] = Field(default="starboard", description="side to which it turns")
+
+
+Law = Weave | Circle
 Pattern = Annotated[
-    Annotated[Waypoints, Tag("Waypoints")] | Annotated[LawnMower, Tag("LawnMower")],
-    Discriminator(tag_by_kind(Waypoints, LawnMower)),
+    Annotated[Waypoints, Tag("Waypoints")]
+    | Annotated[LawnMower, Tag("LawnMower")]
+    | Annotated[Weave, Tag("Weave")]
+    | Annotated[Circle, Tag("Circle")],
+    Discriminator(tag_by_kind(Waypoints, LawnMower, Weave, Circle)),
 ]
+KINDS: dict[str, type[Settings]] = {"waypoints": Waypoints, "lawn_mower": LawnMower, "weave": Weave, "circle": Circle}
+
+
+def heading(pattern: Law, time: float, speed: float) -> float:
+    """Heading [rad] of a track that is no way between points.
+
+    Args:
+        pattern: The track.
+        time: Since its start [s].
+        speed: Through the water [m/s].
+    """
+    if isinstance(pattern, Weave):
+        swing = math.sin(math.tau * time / pattern.swing + math.radians(pattern.phase_deg))
+        return wrap(math.radians(pattern.course_deg + pattern.amplitude_deg * swing))
+    turned = speed * time / pattern.radius * (1.0 if pattern.side == "starboard" else -1.0)
+    return wrap(math.radians(pattern.heading_deg) + turned)
 
 
 def points(pattern: Waypoints | LawnMower) -> Array:

@@ -1,0 +1,161 @@
+"""A follower's extended Kalman filter: compass, gyro and DVL, the unknown current, ranges to vehicles that move."""
+
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base.alpha_beta import AlphaBeta
+from auvsim.base.errors import InputError
+from auvsim.base.reading import Reading
+from auvsim.navigation.docking import DEPTH_GAINS
+from auvsim.navigation.estimate import Estimate
+from auvsim.navigation.heard import Listener, Sight
+from auvsim.navigation.measurements import measurements, of_kind
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.sensors.compass import CompassSettings
+from auvsim.sensors.dvl import DvlSettings
+from estimators.core.estimator import Estimator
+from estimators.core.filter import ModelFilter
+from estimators.core.history import Node
+from estimators.core.models import sensors
+from estimators.core.models.motion import constant_velocity, with_current, with_error
+from estimators.core.models.process import MotionProcess
+from estimators.core.types import Gaussian, Measurement
+from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
+from estimators.docking.models import COMPASS
+
+SPEED, TURNING, GYRO_BIAS = 2.0, 0.1, 1e-3  # not known at first: velocities [m/s], yaw rate, bias of a gyro [rad/s]
+
+
+class RangeNavigator:
+    """Position, heading, velocity through the water and current, by ranges to those whose packets say where they are.
+
+    A range is that from where the other was when it sent to where this vehicle was when the packet arrived, and goes
+    into the delay buffer with that stamp. The current is the difference between what ranges and what the DVL's water
+    track say; errors of the others' positions count as independent from packet to packet.
+    """
+
+    def __init__(self, setup: NavigatorSetup) -> None:
+        s = setup.settings
+        if setup.modem is None or not of_kind(setup.sensors, DvlSettings):
+            lacks = "a modem (modem: {})" if setup.modem is None else "a DVL (sensors.dvl.enabled: true)"
+            raise InputError(f"estimator 'range_ekf' of '{setup.vehicle}': needs {lacks}")
+        self._settings, self._modem, self._sensors = s, setup.modem, dict(setup.sensors)
+        compass = setup.sensors.get("compass")
+        self._compass_bias = math.radians(
+            max(compass.heading_bias_deg, 0.01) if isinstance(compass, CompassSettings) else 1.0
+        )
+        motion = with_current(constant_velocity(turning=True))
+        for name, unit in (("compass_bias", "rad"), ("gyro_bias", "rad/s")):
+            motion = with_error(motion, name, unit)
+        self.states: Mapping[str, str] = dict(motion.space.units)
+        self._space = motion.space
+        noise = {
+            "north": s.position_noise, "east": s.position_noise, "surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
+            "current_north": s.current_noise, "current_east": s.current_noise,
+        }  # fmt: skip
+        models = {
+            COMPASS: sensors.compass(motion, bias="compass_bias"),
+            GYRO: sensors.gyro(motion, bias="gyro_bias"),
+            BOTTOM: sensors.dvl(motion, track="bottom"),
+            WATER: sensors.dvl(motion, track="water"),
+            RANGE: sensors.range_to(motion, point=setup.modem.transducer[:2]),
+        }
+        start_north, start_east = setup.start
+        self._origin = (start_north if s.north is None else s.north, start_east if s.east is None else s.east)
+        filter_ = ModelFilter(MotionProcess(motion, noise), models, self._start, gates=0.9999)
+        self._estimator = Estimator(filter_, step=setup.period)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._estimator.reset()
+        self._listener = Listener(self._modem)
+        self._depth = AlphaBeta(*DEPTH_GAINS)
+        self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
+        self._belief: Gaussian | None = None
+
+    @property
+    def nodes(self) -> Sequence[Node[Any]]:
+        """See `Buffered`."""
+        return self._estimator.nodes
+
+    @property
+    def filter(self) -> ModelFilter:
+        """See `Buffered`."""
+        return self._estimator.filter  # pyright: ignore[reportReturnType]
+
+    def smoothed(self) -> list[tuple[float, Gaussian]]:
+        """See `Buffered`."""
+        return self._estimator.smoothed()
+
+    def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
+        """See `Navigator.update`."""
+        found: list[Measurement] = []
+        for reading in readings:
+            if reading.sensor == "compass":
+                self._tilt = (float(reading.value[1]), float(reading.value[2]))
+            if reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+            elif reading.sensor in self._sensors:
+                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
+        found += [self._range(sight) for sight in self._listener.sights(messages) if sight.range is not None]
+        result = self._estimator.tick(time, (), found)
+        n = len(self._space)
+        self._belief = result.belief
+        belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
+        mean = belief.mean
+        return Estimate(
+            time=time,
+            position=np.array((mean[0], mean[1], self._depth.at(time) or 0.0)),
+            heading=float(mean[2]),
+            velocity=mean[3:6],
+            current=mean[6:8],
+            covariance=belief.covariance,
+            initialised=result.belief is not None,
+            mean=mean,
+            refused=sum(result.refused.values()),
+            reasons=result.refused,
+            reinitialised=result.reinitialised,
+            outcomes=result.outcomes,
+        )
+
+    def _range(self, sight: Sight) -> Measurement:
+        """A range to where the other was; across depths its error of position counts less."""
+        assert sight.range is not None
+        s, report = self._settings, sight.report
+        down = report.depth - (self._depth.value or 0.0) - self._modem.transducer[2]
+        own = self._origin if self._belief is None else self._belief.mean[:2].tolist()
+        flat = max(0.0, 1.0 - (down / max(abs(sight.range), 1e-9)) ** 2)  # share of the range that is horizontal
+        timing = self._modem.sound_speed * self._modem.modem.timing_noise
+        variance = s.range_noise**2 + timing**2 + flat * sight.variance_along(*own)
+        return Measurement(
+            kind=RANGE, value=np.array((sight.range,)), covariance=np.array(((variance,),)), stamp=sight.stamp,
+            received=sight.received, sequence=sight.sequence, source=sight.source,
+            parameters=(report.north, report.east, down),
+        )  # fmt: skip
+
+    def _start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+        """At the first compass reading, at the assumed start."""
+        compass = next((m for m in nodes[index].measurements if m.kind == COMPASS), None)
+        if compass is None:
+            return None
+        s, bias = self._settings, self._compass_bias
+        known = {
+            "north": s.position, "east": s.position, "current_north": s.current, "current_east": s.current,
+            "heading": math.hypot(bias, math.sqrt(compass.covariance.item())), "surge": SPEED, "sway": SPEED,
+            "yaw_rate": TURNING, "compass_bias": bias, "gyro_bias": GYRO_BIAS,
+        }  # fmt: skip
+        north, east = self._origin
+        belief = self._space.belief({"north": north, "east": east, "heading": float(compass.value[0])}, known)
+        i, j = self._space.index("heading"), self._space.index("compass_bias")
+        belief.covariance[i, j] = belief.covariance[j, i] = -(bias**2)  # it shows too much: so does the heading
+        return belief, [compass]
+
+
+def range_ekf(setup: NavigatorSetup) -> Navigator:
+    """An extended Kalman filter of a follower, by ranges to others."""
+    return RangeNavigator(setup)
