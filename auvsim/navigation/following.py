@@ -55,7 +55,8 @@ class RangeNavigator:
         self.states: Mapping[str, str] = dict(motion.space.units)
         self._space = motion.space
         noise = {
-            "north": s.position_noise, "east": s.position_noise, "surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
+            "north": s.position_noise, "east": s.position_noise,
+            "surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
             "current_north": s.current_noise, "current_east": s.current_noise,
         }  # fmt: skip
         models = {

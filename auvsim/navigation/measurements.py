@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
 from auvsim.sensors.compass import CompassSettings
