@@ -262,7 +262,7 @@ class SharedChannel:
 
     def _forget(self) -> None:
         """Drops what overlaps nothing any more whose fate is open."""
-        open_from = {name: math.inf for name in self._receivers}
+        open_from = dict.fromkeys(self._receivers, math.inf)
         for arrival in self._coming:
             begin = arrival.transmission.start if math.isnan(arrival.front) else arrival.front
             open_from[arrival.receiver] = min(open_from[arrival.receiver], begin)

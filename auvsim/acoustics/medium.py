@@ -6,13 +6,14 @@ travel time between two points a distance d apart, with sound speeds c1 and c2, 
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 SLOWEST = 100.0  # least sound speed anywhere in the water [m/s]
 EXACT = 1e-10  # of an arrival [s]
 
-Point = Sequence[float]  # north, east, depth [m]
+Point = Any  # (3,) north, east, depth [m]: an array or a tuple
 
 
 @dataclass(frozen=True, slots=True)

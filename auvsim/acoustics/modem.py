@@ -48,11 +48,15 @@ class ModemSettings(Settings):
     processing_jitter: float | None = Field(default=None, ge=0.0, description="half width of its uniform spread [s]")
     timing_noise: float | None = Field(default=None, ge=0.0, description="white noise of arrival times, sd [s]")
     bearing_noise_deg: float | None = Field(
-        default=None, ge=0.0, description="white noise of bearings, sd; none: the preset's, which may measure none [deg]"
+        default=None,
+        ge=0.0,
+        description="white noise of bearings, sd; none: the preset's, which may measure none [deg]",
     )
     bearing_bias_deg: float = Field(default=0.0, description="constant error of bearings (mounting) [deg]")
     one_way: bool = Field(default=True, description="whether it takes ranges by one-way travel time")
-    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed that it assumes [m/s of sound]")
+    sound_speed: float = Field(
+        default=1500.0, ge=1000.0, le=2000.0, description="sound speed that it assumes [m/s of sound]"
+    )
     turn_around: float = Field(
         default=2.0, gt=0.0, description="known time from the first wave front of a request to that of the reply [s]"
     )

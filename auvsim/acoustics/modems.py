@@ -27,7 +27,9 @@ UNDER_WAY = "under way"
 class SoundSettings(ChannelSettings):
     """The water in which modems talk, and their medium access."""
 
-    sound_speed: float = Field(default=1500.0, ge=1000.0, le=2000.0, description="sound speed at the surface [m/s of sound]")
+    sound_speed: float = Field(
+        default=1500.0, ge=1000.0, le=2000.0, description="sound speed at the surface [m/s of sound]"
+    )
     sound_speed_gradient: float = Field(
         default=0.0, ge=-1.0, le=1.0, description="change of the sound speed with depth [1/s]"
     )

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 
 from auvsim.data.attributes import RUN_ATTRIBUTES, STRUCTURE_ATTRIBUTES, VEHICLE_ATTRIBUTES, AttributeSpec
-from auvsim.data.variables import OPTIONAL_TABLES, READING, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table
+from auvsim.data.variables import OPTIONAL_TABLES, READING, RECEIVED, ROOT_TABLES, SIZES, VEHICLE_TABLES, Table
 
 INTRODUCTION = """\
 # Log format 3
@@ -43,6 +43,7 @@ def table_markdown(tables: Mapping[str, Table] | None = None) -> str:
     for name, table in VEHICLE_TABLES.items():
         lines += _table(f"Group `vehicles/<name>/{name}`{_MORE.get(name, '')}", table)
     lines += _table("Group `vehicles/<name>/sensors/<sensor>`, with `value` and the sensor's own variables", READING)
+    lines += _table("Group `vehicles/<name>/received`, of a vehicle with a modem", RECEIVED)
     for name, table in ROOT_TABLES.items():
         lines += _table(f"Group `{name}`", table)
     for name, table in OPTIONAL_TABLES.items():

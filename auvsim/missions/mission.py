@@ -71,7 +71,8 @@ class Mission:
     """A mission; made by `Class(setup)`.
 
     A subclass sets `phases`, keeps `phase` (the index of the present one) and `finished` up to date, appends to
-    `events`, and to `outbox` what its vehicle's modem is to send, and implements `update`. All else has defaults, which it may override.
+    `events`, and to `outbox` what its vehicle's modem is to send, and implements `update`. All else has defaults, which
+    it may override.
     """
 
     phases: ClassVar[tuple[str, ...]]  # names of the phases, as logged

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.heard import Listener, Sight
-from auvsim.navigation.measurements import measurements, of_kind
+from auvsim.navigation.measurements import averaged, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
@@ -54,7 +55,8 @@ class RangeNavigator:
         self.states: Mapping[str, str] = dict(motion.space.units)
         self._space = motion.space
         noise = {
-            "north": s.position_noise, "east": s.position_noise, "surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
+            "north": s.position_noise, "east": s.position_noise,
+            "surge": s.acceleration, "sway": s.acceleration, "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
             "current_north": s.current_noise, "current_east": s.current_noise,
         }  # fmt: skip
         models = {
@@ -95,13 +97,15 @@ class RangeNavigator:
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """See `Navigator.update`."""
         found: list[Measurement] = []
-        for reading in readings:
+        for reading, count in averaged(readings):
             if reading.sensor == "compass":
                 self._tilt = (float(reading.value[1]), float(reading.value[2]))
             if reading.sensor == "depth":
                 self._depth.update(reading.stamp, float(reading.value[0]))
             elif reading.sensor in self._sensors:
-                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
+                own, depth = self._sensors[reading.sensor], self._depth.value or 0.0
+                single = measurements(reading, own, depth, tilt=self._tilt)
+                found += [replace(m, covariance=m.covariance / count) for m in single] if count > 1 else single
         found += [self._range(sight) for sight in self._listener.sights(messages) if sight.range is not None]
         result = self._estimator.tick(time, (), found)
         n = len(self._space)

@@ -68,7 +68,7 @@ class Listener:
                     )  # fmt: skip
 
     def arrival(self, delivery: Delivery) -> float:
-        """When a packet's first wave front arrived, in the time of the run [s]: by the own clock, unless that is off."""
+        """When a packet's first wave front arrived, in the time of the run [s], by the own clock unless that is off."""
         modem, bits = self._modem, delivery.message.bits
         nominal = delivery.received - modem.processing - modem.duration(bits)
         arrived = delivery.arrived

@@ -1,10 +1,11 @@
 """Readings as measurements for filters of `estimators.core`: value, covariance by the sensor's data sheet, source."""
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
+
 from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
 from auvsim.sensors.compass import CompassSettings
@@ -69,6 +70,29 @@ def _measurement(kind: str, reading: Reading, value: Array, *sigmas: float, **mo
         kind=kind, value=value, covariance=np.diag(np.maximum(sigmas, 1e-3) ** 2), stamp=reading.stamp,
         received=reading.received, sequence=reading.sequence, **more,
     )  # fmt: skip
+
+
+def averaged(readings: Sequence[Reading]) -> list[tuple[Reading, int]]:
+    """Means of the readings of each sensor, at the mean of their stamps, and how many are in each.
+
+    For sensors that are read often, of which the noise is white. Headings of a compass are taken the short way round;
+    where a value is not finite, as of a DVL's lost track, the readings stay single.
+    """
+    groups: dict[str, list[Reading]] = {}
+    for reading in readings:
+        groups.setdefault(reading.sensor, []).append(reading)
+    means = []
+    for group in groups.values():
+        values = np.array([r.value for r in group])
+        if len(group) == 1 or not np.isfinite(values).all():
+            means += [(reading, 1) for reading in group]
+            continue
+        n, first = len(group), values[0]
+        if group[0].sensor == "compass":
+            values = first + np.remainder(values - first + math.pi, math.tau) - math.pi
+        stamp = sum(r.stamp for r in group) / n
+        means.append((group[-1]._replace(stamp=stamp, value=values.sum(axis=0) / n), n))
+    return means
 
 
 def of_kind(sensors: Mapping[str, Any], settings: type) -> dict[str, Any]:

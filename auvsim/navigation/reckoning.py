@@ -53,8 +53,12 @@ class ReckoningNavigator:
         process = MotionProcess(
             motion,
             {
-                "north": s.position_noise, "east": s.position_noise, "surge": s.acceleration, "sway": s.acceleration,
-                "yaw_rate": s.yaw_acceleration, "gyro_bias": 1e-12,
+                "north": s.position_noise,
+                "east": s.position_noise,
+                "surge": s.acceleration,
+                "sway": s.acceleration,
+                "yaw_rate": s.yaw_acceleration,
+                "gyro_bias": 1e-12,
             },
         )
         models = {

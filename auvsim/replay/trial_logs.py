@@ -87,8 +87,8 @@ def _messages(log: VehicleLog) -> Iterator[Delivery]:
             tuple(payload[: row["numbers"]].tolist()), row["bits"], row["sequence"],
             answers=None if row["answers"] < 0 else row["answers"],
         )  # fmt: skip
-        measured = (None if math.isnan(row[name]) else row[name] for name in ("range", "bearing"))
-        yield Delivery(message, row["time"], *measured, row["arrived"])
+        distance, bearing = (None if math.isnan(row[name]) else row[name] for name in ("range", "bearing"))
+        yield Delivery(message, row["time"], distance, bearing, row["arrived"])
 
 
 def _delivered(log: VehicleLog, reading: Reading) -> Arrival:

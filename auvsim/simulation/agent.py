@@ -19,8 +19,8 @@ from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
 from auvsim.navigation.gate import Gate
-from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.measurements import of_kind
+from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.navigator import Navigator
 from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth

@@ -7,12 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from scipy.stats import chi2, norm
+from still_water import LOUD, Water, fates, packet, still
 
 from auvsim.acoustics.channel import ChannelSettings
 from auvsim.acoustics.medium import Medium
 from auvsim.acoustics.propagation import noise_density, packet_success, transmission_loss
-
-from still_water import LOUD, Water, fates, packet, still
 
 C = 1500.0
 
@@ -47,7 +46,7 @@ def test_a_wave_front_is_looked_for_at_every_distance():
 
 
 def test_two_equal_packets_that_overlap_both_die():
-    """At the same distance and level; the later one is 1 ms short of leaving the first one alone, or 1 ms clear of it."""
+    """At the same distance and level; the later one begins 1 ms before the first has ended, or 1 ms after."""
     places = {"a": still(-300.0), "b": still(300.0), "c": still(0.0)}
     duration = 0.5
     for gap, fate in ((0.0, "collision"), (0.3, "collision"), (0.499, "collision"), (0.501, "delivered")):
@@ -62,7 +61,9 @@ def test_the_stronger_of_two_survives_by_the_capture_ratio():
     places = {"a": still(-near), "b": still(far), "c": still(0.0)}
     messages = [packet("a", 1.4), packet("b", 1.0)]  # both are at c from 1.467 s
     for capture, fate in ((difference - 0.01, "delivered"), (difference + 0.01, "collision")):
-        found = fates(Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0))
+        found = fates(
+            Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0)
+        )
         assert found["a", "c", 0] == fate
         assert found["b", "c", 0] == "collision"
 
@@ -73,7 +74,9 @@ def test_interference_adds_up():
     places = {"a": still(-100.0), "b": still(700.0), "c": still(0.0), "d": still(0.0, 700.0)}
     messages = [packet("a", 1.4), packet("b", 1.0), packet("d", 1.0)]
     for capture, fate in ((difference - 3.02, "delivered"), (difference - 3.0, "collision")):
-        found = fates(Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0))
+        found = fates(
+            Water(places, settings=ChannelSettings(noise_level=0.0, capture=capture)).run(messages, until=4.0)
+        )
         assert found["a", "c", 0] == fate
 
 

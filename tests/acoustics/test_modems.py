@@ -189,7 +189,7 @@ def test_a_turn_around_that_is_too_short_is_refused():
 
 
 def test_who_is_asked_must_have_a_modem():
-    with pytest.raises(InputError, match="vehicles.a.modem.ask.whom: no modem on 'z'; there are a"):
+    with pytest.raises(InputError, match=r"vehicles\.a\.modem.ask.whom: no modem on 'z'; there are a"):
         Fleet({"a": ((0, 0, 20), STILL, {"ask": {"whom": "z"}})})
 
 

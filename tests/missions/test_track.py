@@ -10,7 +10,7 @@ import pytest
 from auvsim.analysis.summary import summarise
 from auvsim.missions.mission import MissionSetup, Situation
 from auvsim.missions.track.mission import DONE, SEARCH, UNDER_WAY, Track, TrackSettings
-from auvsim.missions.track.patterns import LawnMower, Waypoints, points
+from auvsim.missions.track.patterns import Circle, LawnMower, Waypoints, Weave, heading, points
 from auvsim.navigation.estimate import Estimate
 from auvsim.simulation import scenario
 from auvsim.simulation.run import run
@@ -172,3 +172,55 @@ def test_a_log_without_the_settings_of_its_track_is_named(sailed) -> None:
     }
     with pytest.raises(InputError, match="mission_settings"):
         summarise(replace(sailed.log, group_attributes=groups).vehicle())
+
+
+@pytest.mark.parametrize("side", ["starboard", "port"])
+def test_a_circle_is_one(side: Any) -> None:
+    """Integrated headings come back to the start after one turn, a diameter to the side asked for at half of it."""
+    pattern, speed = Circle(heading_deg=30.0, radius=60.0, side=side), 1.7
+    turn = math.tau * 60.0 / speed
+    times = (np.arange(4000) + 0.5) / 4000 * turn
+    steps = (
+        turn
+        / 4000
+        * speed
+        * np.array([(math.cos(h), math.sin(h)) for h in (heading(pattern, t, speed) for t in times)])
+    )
+    assert steps.sum(axis=0) == pytest.approx((0.0, 0.0), abs=1e-9)
+    across = math.radians(30.0 + (90.0 if side == "starboard" else -90.0))
+    half = 120.0 * np.array((math.cos(across), math.sin(across)))
+    assert steps[:2000].sum(axis=0) == pytest.approx(half, abs=1e-4)  # midpoint rule of 4000 steps
+
+
+def test_a_weave_is_the_papers() -> None:
+    """Qiu and Li's scenario `weave`: c0 + 40 deg sin(2 pi t / 500), and with a phase of 90 deg the cosine."""
+    leader = Weave(course_deg=8.0, amplitude_deg=40.0, swing=500.0)
+    follower = Weave(course_deg=8.0, amplitude_deg=40.0, swing=300.0, phase_deg=90.0)
+    for time in (0.0, 77.0, 431.0):
+        expected = 8.0 + 40.0 * math.sin(math.tau * time / 500.0), 8.0 + 40.0 * math.cos(math.tau * time / 300.0)
+        assert math.degrees(heading(leader, time, 2.0)) == pytest.approx(expected[0])
+        assert math.degrees(heading(follower, time, 2.0)) == pytest.approx(expected[1])
+
+
+def test_headings_in_time_need_no_position() -> None:
+    mission = track(pattern=Weave(course_deg=20.0, amplitude_deg=30.0, swing=40.0), depth=7.0, speed=1.2, lasts=50.0)
+    first = mission.update(situation(3.0, 0.0, 0.0, known=False))
+    assert first[:3] == pytest.approx((math.radians(20.0), 7.0, 1.2))
+    assert mission.phase == UNDER_WAY
+    assert mission.update(situation(13.0, 0.0, 0.0, known=False)).heading == pytest.approx(math.radians(50.0))
+    mission.update(situation(53.0, 0.0, 0.0, known=False))
+    assert (mission.phase, mission.finished) == (DONE, True)
+    assert mission.row()[0] == 0
+    assert "not finished" in mission.overdue(90.0)
+    assert "to the end" in track(pattern=Circle()).overdue(90.0)
+
+
+def test_metrics_of_a_track_without_waypoints() -> None:
+    plan = scenario.parse({
+        "duration": 20.0, "vehicles": {"auv": {
+            "start": {"north": 0.0, "east": 0.0, "depth": 10.0, "speed": 1.5}, "sensors": {"usbl": {"enabled": False}},
+            "estimator": {"kind": "dead_reckoning"},
+            "mission": {"kind": "track", "pattern": {"kind": "circle", "radius": 30.0}, "lasts": 10.0},
+        }},
+    })  # fmt: skip
+    assert Track.metrics(run(plan).vehicle()) == {"finished": True, "waypoints": 0, "cross_track_rms": None}

@@ -32,7 +32,7 @@ class LawnMower(Settings):
 
 
 class Weave(Settings):
-    """A heading that swings about a course, which needs no position: course + amplitude sin(2 pi t / period + phase)."""
+    """A heading that swings about a course and needs no position: course + amplitude sin(2 pi t / swing + phase)."""
 
     kind: Literal["weave"] = "weave"
     course_deg: float = Field(default=0.0, description="mean heading, clockwise from north [deg]")
