@@ -65,7 +65,7 @@ def formation(
             raise InputError(f"command line: the follower is where a leader is, at {_text(place)}; move one of them")
     deviations = [_number(text, "--noise") for text in noise.split(",")]
     if len(deviations) not in (1, len(places)):
-        raise InputError(f"command line: --noise has {len(deviations)} values for {len(places)} leaders; 1 or as many")
+        raise InputError(f"command line: --noise has {len(deviations)} values, not 1 or {len(places)}, one each")
     limits = {"--noise": min(deviations), "--step": step, "--reach": reach, "--modem": modem}
     for name, value in limits.items():
         if not (value > 0.0 and (math.isfinite(value) or name == "--modem")):
@@ -116,7 +116,8 @@ def table(f: Formation, found: Judgement) -> Table:
     lines.add_row("all", "", "", "", "", "see the map", "", _metres(found.together_rms))
     axes = f"{e.major:.2f} by {e.minor:.2f} m, major axis to {math.degrees(e.bearing):.0f} deg"
     axes = "open" if math.isinf(e.major) else axes
-    lines.caption = f"ellipse of one set: {axes}; the least error of one set of such ranges anywhere: {_metres(found.best_snapshot)}"
+    best = f"the least error of one set of such ranges anywhere: {_metres(found.best_snapshot)}"
+    lines.caption = f"ellipse of one set: {axes}; {best}"
     return lines
 
 
