@@ -77,9 +77,10 @@ def formation(
         raise InputError(f"command line: --heading-deg {heading_deg:g} must be a finite number")
     if apart >= modem:
         raise InputError(f"command line: --apart {apart:g} must be less than --modem {modem:g}")
+    limits_of_moves = Reach(distance=reach, modem=modem, apart=apart)
     return Formation(
-        leaders=np.array(places), follower=own, deviations=np.broadcast_to(np.array(deviations), len(places)).copy(),
-        speed=speed, heading=math.radians(heading_deg), step=step, reach=Reach(distance=reach, modem=modem, apart=apart),
+        leaders=np.array(places), follower=own, deviations=np.resize(np.array(deviations), len(places)),
+        speed=speed, heading=math.radians(heading_deg), step=step, reach=limits_of_moves,
     )  # fmt: skip
 
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvsim.base.frames import Array
 from auvsim.data.log import VehicleLog
@@ -34,10 +35,12 @@ def station_errors(log: VehicleLog) -> tuple[Array, Array]:
     return times, np.column_stack(places) - mission["target"][kept]
 
 
-def settled(log: VehicleLog, times: Array) -> Array:
+def settled(log: VehicleLog, times: Array) -> NDArray[np.bool_]:
     """Which times are later than SETTLED after the start and after each new station."""
     mission = log["mission"]
-    station = mission["station"]
+    station = np.column_stack((mission["ahead"], mission["starboard"]))
     changes = np.flatnonzero((np.diff(station, axis=0) != 0.0).any(axis=1)) + 1
-    begins = [mission["time"][0], *mission["time"][changes]] if len(mission["time"]) else []
-    return ~np.any([(times >= begin) & (times < begin + SETTLED) for begin in begins], axis=0) if begins else times < 0
+    since = np.full(len(times), np.inf)
+    for begin in (mission["time"][0], *mission["time"][changes]) if len(mission["time"]) else ():
+        since = np.where(times >= begin, np.minimum(since, times - begin), since)
+    return np.asarray(since >= SETTLED)

@@ -40,4 +40,4 @@ class FormationSettings(Settings):
     gain: float = Field(default=0.1, gt=0.0, description="speed for each metre behind the station [1/s]")
     margin: float = Field(default=0.5, gt=0.0, description="most speed that is added to catch up [m/s]")
     lookahead: float = Field(default=20.0, gt=0.0, description="lookahead of the line of sight [m]")
-    choice: ChoiceSettings = ChoiceSettings()
+    follow: ChoiceSettings = ChoiceSettings()
