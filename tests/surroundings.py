@@ -17,6 +17,10 @@ class Around:
     structures: dict[str, Any] = field(default_factory=dict)
     vehicles: dict[str, Truth] = field(default_factory=dict)
 
+    def rays(self, place: Any, directions: Any, reach: float) -> None:
+        """Nothing to meet."""
+        return
+
     def truth(self, vehicle: str) -> Truth:
         """The state of another vehicle."""
         return self.vehicles[vehicle]

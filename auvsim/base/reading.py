@@ -1,6 +1,6 @@
 """A reading: the form in which anything measured or received reaches navigation, control and the log."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from auvsim.base.frames import Array
 
@@ -18,6 +18,8 @@ class Reading(NamedTuple):  # a frozen dataclass takes three times as long to ma
     | gyro     | (3,) p, q, r [rad/s]                                                                     |
     | range    | (1,) slant range to a beacon [m]                                                         |
     | fix      | (2,) north, east [m]                                                                     |
+    | imaging_ | (2,) mean intensity, largest by the mean; or, if they are logged, (beams, bins) levels   |
+    | sonar    | in half decibels; `image` has the intensities                                            |
     """
 
     sensor: str
@@ -25,3 +27,4 @@ class Reading(NamedTuple):  # a frozen dataclass takes three times as long to ma
     received: float  # when it arrived [s]
     value: Array
     sequence: int = 0  # counts the readings of one sensor, lost ones included
+    image: Any = None  # what is too large for the log: the intensities (beams, bins) of an imaging sonar

@@ -293,6 +293,24 @@ class Study:
     """Runs one of the studies behind the figures of the README; without a name lists them."""
 
 
+@dataclass(frozen=True, kw_only=True)
+class ShowVehicle:
+    """Shows what a vehicle does, as one holds it against a data sheet; or makes a vehicle of a data sheet.
+
+    Of a vehicle with fins: speed against shaft speed, trim, turning circles, zig-zag, dive, stopping, and the error of the planar
+    model that filters assume. Of one that thrusters drive: speed against force in each axis, stopping, a step of its place,
+    holding in a current. With --from: NAME.xml, README.md, in which every estimate is marked, and
+    controller.yaml.
+    """
+
+    name: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="NAME|MODEL.xml")] = None
+    """A vehicle in models/, or the path of an MJCF file."""
+    out: Path | None = None
+    """Folder of the page, NAME.png; with --from of the vehicle, by default vehicle/."""
+    sheet: Annotated[Path | None, tyro.conf.arg(name="from", metavar="SHEET.yaml")] = None
+    """Data sheet from which to make a vehicle."""
+
+
 Command = (
     Dock
     | Run
@@ -307,6 +325,7 @@ Command = (
     | Reproduce
     | Formation
     | Study
+    | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
 TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
@@ -454,6 +473,15 @@ def _run(arguments: list[str]) -> int:
             command.logs, estimators=command.estimator, what_if=what_if, smooth=command.smooth, out=command.out,
             columns=command.columns, vehicle=command.vehicle,
         )  # fmt: skip
+
+    if isinstance(command, ShowVehicle):
+        from auvsim.cli import vehicle
+
+        if (command.name is None) == (command.sheet is None):
+            raise InputError("command line: give the name of a vehicle, or --from SHEET.yaml")
+        if command.sheet is not None:
+            return vehicle.from_sheet(command.sheet, command.out or Path("vehicle"))
+        return vehicle.show(command.name or "", command.out)
 
     if isinstance(command, Reproduce):
         from auvsim.cli import reproduce

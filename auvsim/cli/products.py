@@ -19,11 +19,19 @@ def is_manoeuvre(log: Log) -> bool:
 
 
 def plots(log: Log, folder: Path) -> None:
+<<<<<<< HEAD
     """Draws track.png and estimates.png; of a manoeuvre one picture of its name; of several vehicles fleet.png.
 
     Of a formation formation.png as well.
     """
     from auvsim.analysis import fleet_plots, formation_plots, manoeuvre_plots, plots
+=======
+    """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png.
+
+    Where vehicles have modems also packets.png.
+    """
+    from auvsim.analysis import fleet_plots, manoeuvre_plots, network_plots, plots
+>>>>>>> main
     from auvsim.missions.manoeuvres import laws
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
@@ -32,6 +40,9 @@ def plots(log: Log, folder: Path) -> None:
         with whole(folder / f"{laws.name(manoeuvre_metrics.settings(vehicle))}.png") as partial:
             manoeuvre_plots.manoeuvre(vehicle, partial)
         return
+    if network_plots.talks(log):
+        with whole(folder / "packets.png") as partial:
+            network_plots.network(log, partial)
     if len(log.vehicles) > 1:
         with whole(folder / "fleet.png") as partial:
             fleet_plots.fleet(log, partial)

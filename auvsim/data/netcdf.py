@@ -161,7 +161,8 @@ class GroupWriter:
         options["chunks"] = tuple(max(size, 1) for size in sizes)
         if stored.dtype == object:
             return group.create_dataset(name, data=stored, dtype=h5py.string_dtype(), **options)
-        if stored.ndim == 1:  # times, counts, held commands; of vectors and covariances gzip only takes 15 %, slowly
+        images = stored.ndim == 3 and stored.dtype == np.int8
+        if stored.ndim == 1 or images:  # also held commands; of vectors and covariances gzip only takes 15 %, slowly
             options |= {"compression": "gzip", "compression_opts": 1, "shuffle": True}
         dataset = group.create_dataset(name, data=stored, **options)
         if item.coded or item.values.dtype == bool:

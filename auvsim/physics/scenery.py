@@ -1,16 +1,19 @@
 """Appearance of the scene: light, water and sea floor; only the height of the floor matters to physics."""
 
+import math
 from typing import Any
 
 import mujoco
 import numpy as np
 
 from auvsim.base.frames import Array
-from auvsim.water.terrain import GriddedFloor, SlopedFloor, Terrain
+from auvsim.water.terrain import SlopedFloor, Terrain
+from auvsim.water.terrain_grid import GriddedFloor
 
 WATER = (0.07, 0.27, 0.36)  # colour into which everything fades [rgb]
 TILE = 100.0  # side of the square after which the sea floor's pattern repeats [m]
 PIXELS = 512  # of the pattern along that side
+MOST_POINTS = 257  # along each side of a height field: more cost MuJoCo time and memory
 HALF_WIDTH = 1500.0  # of the sea floor [m]
 EXTENT = 100.0  # of the scene, the unit of MuJoCo's distances [m]
 MURK = (4.0, 65.0)  # distances at which the water begins to hide things and hides all [m]
@@ -56,7 +59,7 @@ def _add_sea_floor(root: Any, terrain: Terrain) -> None:
     root.asset.add("material", name="sand", texture="sand", texrepeat=(repeat, repeat), specular=0, shininess=0)
     shape: dict[str, Any] = {"type": "plane", "size": (HALF_WIDTH, HALF_WIDTH, 10)}
     if isinstance(terrain, GriddedFloor):
-        shape, place = _height_field(root, terrain)
+        shape, place = _height_field(root, terrain.coarse(MOST_POINTS))
     else:
         place = (0, 0, -terrain.depth(0.0, 0.0))
     if isinstance(terrain, SlopedFloor):
@@ -78,6 +81,7 @@ def shape_sea_floor(model: mujoco.MjModel, terrain: Terrain) -> None:
     """Puts the depths of a gridded floor into the compiled scene; any other is right already."""
     if not isinstance(terrain, GriddedFloor):
         return
+    terrain = terrain.coarse(MOST_POINTS)
     field, deepest = model.hfield(SEA_FLOOR), float(terrain.depths.max())
     heights = (deepest - terrain.depths.T[::-1]) / field.size[2]
     at = int(field.adr[0])
@@ -141,6 +145,20 @@ def pillar_ends(sea_floor: float, depth: float, place: Array) -> Array | None:
         return None
     x, y = place.tolist()
     return np.array([x, y, -depth - PILLAR_TOP, x, y, -sea_floor])
+
+
+def widen(model: mujoco.MjModel, reach: float) -> None:
+    """Makes a level or sloping sea floor, and the view, wide enough for places up to `reach` [m] from its middle.
+
+    Its squares keep their size. What is near enough for the floor as it was made changes nothing.
+    """
+    floor = model.geom(SEA_FLOOR)
+    factor = math.ceil(2.0 * reach / HALF_WIDTH)
+    if factor <= 2 or floor.type[0] != mujoco.mjtGeom.mjGEOM_PLANE:
+        return
+    floor.size[:2] *= factor
+    model.material("sand").texrepeat[:] *= factor
+    model.vis.map.zfar *= factor
 
 
 def paint_sea_floor(model: mujoco.MjModel) -> None:

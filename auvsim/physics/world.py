@@ -8,7 +8,7 @@ import numpy as np
 
 from auvsim.base.errors import DivergenceError, InputError
 from auvsim.base.frames import Array, flip
-from auvsim.physics import hydrodynamics, panels
+from auvsim.physics import hydrodynamics, panels, rays
 from auvsim.physics.contacts import Contact, ContactRecorder
 from auvsim.physics.craft import Craft
 from auvsim.physics.scenery import SEA_FLOOR
@@ -19,6 +19,7 @@ from auvsim.water.currents import CurrentField
 
 # Distances within which contact is looked for at every physics tick [m].
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
+BULK = 5.0  # by which what rays meet may lie nearer than its origin [m]
 NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
 OVERLAP = 0.001  # depth from which two things that start are inside each other [m]
@@ -117,6 +118,23 @@ class World:
     def time(self) -> float:
         """Time since the start [s]."""
         return self.data.time
+
+    def rays(self, place: Array, directions: Array, reach: float) -> tuple[Array, Array] | None:
+        """What rays meet of structures and vehicles, see `rays.cast`; None where none of these is within reach.
+
+        Args:
+            place: (3,) where they begin, NED [m]; a vehicle about it is met, too.
+            directions: (n, 3) unit vectors, NED.
+            reach: their length [m].
+        """
+        start = flip(place)
+        near = [np.array(mouth) for mouth in self._mouths]
+        near += [
+            craft.position for craft in self._fleet if np.linalg.norm(craft.position - start) > craft.vehicle.length
+        ]
+        if not any(np.linalg.norm(found - start) < reach + BULK for found in near):
+            return None
+        return rays.cast(self.model, self.data, place, directions, reach)
 
     def contacts(self, vehicle: str) -> list[Contact]:
         """Contacts of a vehicle so far, in order of time."""

@@ -14,12 +14,13 @@ from auvsim.sensors.dvl import Dvl
 from auvsim.sensors.feedback import Feedback
 from auvsim.sensors.fix import Fix
 from auvsim.sensors.gyro import Gyro
+from auvsim.sensors.imaging_sonar import ImagingSonar
 from auvsim.sensors.range import Range
 from auvsim.sensors.sensor import Sensor
 from auvsim.vehicles.library import Vehicle
 
 STANDARD: tuple[type[Sensor], ...] = (Compass, Depth, Feedback, Dvl, Gyro)  # every vehicle has settings for them
-SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range, Fix)}
+SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range, Fix, ImagingSonar)}
 
 
 def find(kind: str) -> Callable[..., Sensor]:

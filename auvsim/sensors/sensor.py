@@ -35,6 +35,19 @@ class Surroundings(Protocol):
         """Docks and the like by name, each with a `pose`."""
         ...
 
+    def rays(self, place: Array, directions: Array, reach: float) -> tuple[Array, Array] | None:
+        """Distances (n,) [m] at which rays meet structures or vehicles, infinite for none, and cosines (n,) there.
+
+        Args:
+            place: (3,) where they begin, NED [m].
+            directions: (n, 3) unit vectors, NED.
+            reach: their length [m].
+
+        Returns:
+            None where none of these is within reach.
+        """
+        ...
+
     def truth(self, vehicle: str) -> Truth:
         """The true state of any vehicle, by name."""
         ...

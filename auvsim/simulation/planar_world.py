@@ -109,6 +109,10 @@ class PlanarWorld:
         self._ticks += ticks
         self._water = water[-1]
 
+    def rays(self, place: Array, directions: Array, reach: float) -> None:
+        """Nothing: there is nothing to meet."""
+        return
+
     def truth(self, vehicle: str) -> Truth:
         """The true state now, in NED and forward-starboard-down."""
         north, east, psi, u, v, r, c_north, c_east = self._state.tolist()

@@ -16,7 +16,7 @@ LINE, ARROW = mujoco.mjtGeom.mjGEOM_LINE, mujoco.mjtGeom.mjGEOM_ARROW
 BALL, DOT = mujoco.mjtGeom.mjGEOM_ELLIPSOID, mujoco.mjtGeom.mjGEOM_BOX
 
 FLOOR: Colour = (0.32, 0.62, 0.72, 1.0)  # in the overview
-MOMENTARY, OF_EACH = 340, 10  # room for marks of the moment, and of each vehicle
+MOMENTARY, OF_EACH = 600, 10  # room for marks of the moment, and of each vehicle
 _UPRIGHT = np.eye(3).ravel()
 _NOTHING = np.zeros(3)
 

@@ -12,6 +12,7 @@ from auvsim.physics import scenery
 from auvsim.video.layer import ARROW, DOT, LINE, Colour, Layer, Mark
 from auvsim.video.motion import Belief, Motion, VehicleMoment
 from auvsim.video.playback import Dock, Moment, Playback
+from auvsim.video.pulses import Pulses
 
 TRUE: Colour = (1.0, 0.86, 0.15, 1.0)
 ESTIMATE: Colour = (1.0, 0.25, 0.78, 1.0)
@@ -163,7 +164,11 @@ class FarMarks:
         self.layer = Layer(playback, marks, overview=True)
         self._floor = playback.model.geom("sea_floor").pos[2]
         self._stations = _stations(playback, unit)
+<<<<<<< HEAD
         self._heard = {name: _heard(motion, playback) for name, motion in playback.motions.items()}
+=======
+        self._pulses = Pulses(playback)
+>>>>>>> main
 
     def update(self, moment: Moment) -> None:
         """Draws the moment."""
@@ -179,7 +184,11 @@ class FarMarks:
                 _ellipse(layer, now.belief, 0.02 * unit)
                 layer.ball((0.5 * unit,) * 3, now.belief.position, np.eye(3), ESTIMATE)
             layer.join(ARROW, 0.6 * unit, now.position - forward, now.position + forward, tracks.colour)
+<<<<<<< HEAD
         self._ranges(moment)
+=======
+        self._pulses.draw(layer, moment.time)
+>>>>>>> main
         self._flow(moment.followed.current)
 
     def _ranges(self, moment: Moment) -> None:

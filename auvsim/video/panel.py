@@ -10,6 +10,7 @@ from auvsim.video.canvas import Box, Picture
 from auvsim.video.motion import Motion, VehicleMoment
 from auvsim.video.overlay import GREY, PANEL, WHITE, Style, darken, fill, rgb, shortened, text_width, write
 from auvsim.video.playback import Moment, Playback
+from auvsim.video.pulses import HEARD, LOST
 
 WIDTH, HEIGHT = 416, 252  # size for which it is laid out [pixels]
 HELD = 2.0  # time without an estimate after which its last error says nothing [s]
@@ -149,7 +150,8 @@ def _legend(on: Panel, playback: Playback, moment: Moment) -> None:
     entries = (
         ("true track", true, 14),
         ("estimate, 2σ", [marks.ESTIMATE], 14),
-        ("dock and axis", [marks.DOCK], 14),
+        *((("dock and axis", [marks.DOCK], 14),) if playback.docks or not playback.talks else ()),
+        *((("heard, lost", [HEARD, LOST], 14),) if playback.talks and not playback.docks else ()),
         ("fix", [marks.FIX], 7),
         (refused, [marks.REFUSED], 7),
         ("current", [marks.CURRENT], 14),

@@ -70,6 +70,7 @@ class Playback:
         )
         self.model, self._vehicles = scene.model, scene.vehicles
         scenery.paint_sea_floor(self.model)
+        scenery.widen(self.model, max(float(np.abs(m.positions[:, :2]).max()) for m in self.motions.values()))
         self.data = mujoco.MjData(self.model)
         found = [motion.received_fixes() for motion in self.motions.values()]
         told = [(float(t), str(r)) for fixes in found for t, r in zip(fixes.times, fixes.reasons, strict=True) if r]
@@ -87,6 +88,11 @@ class Playback:
         places = [int(model.jnt_qposadr[int(actuators[k].trnid[0])]) for k in hinged]
         turning = np.array([actuation.units[k] == "rad/s" for k in hinged], dtype=bool)
         return int(model.joint(f"{name}/").qposadr[0]), places, hinged, turning
+
+    @property
+    def talks(self) -> bool:
+        """Whether any vehicle has a modem."""
+        return any("received" in motion.log for motion in self.motions.values())
 
     @property
     def lone(self) -> bool:

@@ -150,7 +150,7 @@ def _events(playback: Playback, times: Array, shown: Array) -> list[tuple[float,
     told = [(0.0, _start(playback))]
     event = playback.log.groups["event"]
     for time, vehicle, kind, text in zip(*(event[k] for k in ("time", "vehicle", "kind", "text")), strict=True):
-        if time <= playback.end and kind != "refused":  # a refused fix is seen by its mark
+        if time <= playback.end and kind not in ("refused", "lost"):  # a fix or packet is seen by its mark
             who = "" if playback.lone or not vehicle else f"{vehicle} "
             told.append((float(np.interp(time, times, shown)), f"{who}{kind.replace('_', ' ')}: {text}"))
     return told

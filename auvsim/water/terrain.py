@@ -1,10 +1,10 @@
-"""Shape of the sea floor: flat, a slope, or the user's own grid of depths."""
+"""Shape of the sea floor: flat, a slope, the user's own grid of depths, or one made from a seed."""
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Annotated, Literal, NamedTuple, Protocol
+from typing import Annotated, Literal, Protocol
 
 import numpy as np
 from pydantic import Field
@@ -13,8 +13,10 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.base.settings import Settings
 from auvsim.water import grid_file
+from auvsim.water.seabed import SeabedSettings, make
+from auvsim.water.terrain_grid import Corner, GriddedFloor
 
-MOST_POINTS = 257  # of a grid along each side, after it is made regular
+MOST_POINTS = 4097  # of a grid along each side, after it is made regular
 _DOWN = ("sea_floor_depth_below_mean_sea_level", "sea_floor_depth_below_sea_surface", "sea_floor_depth_below_geoid")
 _UP = ("height_above_mean_sea_level", "height_above_geopotential_datum", "height_above_reference_ellipsoid", "altitude")
 
@@ -50,7 +52,9 @@ class DepthGridSettings(Settings):
     longitude: float | None = Field(default=None, ge=-180.0, le=360.0, description="of the datum [deg]")
 
 
-TerrainSettings = Annotated[FlatSettings | SlopeSettings | DepthGridSettings, Field(discriminator="kind")]
+TerrainSettings = Annotated[
+    FlatSettings | SlopeSettings | DepthGridSettings | SeabedSettings, Field(discriminator="kind")
+]
 
 
 class Terrain(Protocol):
@@ -85,33 +89,6 @@ class SlopedFloor:
         return self.level + self.to_north * north + self.to_east * east
 
 
-class Corner(NamedTuple):
-    """Where a regular grid begins, and its spacing."""
-
-    north: float  # [m]
-    east: float  # [m]
-    to_north: float  # between points [m]
-    to_east: float  # between points [m]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class GriddedFloor:
-    """A sea floor of depths on a regular grid, bilinear between its points; held beyond the edge.
-
-    What is touched are two triangles a cell, which leave the bilinear surface by a quarter of the cell's twist at most.
-    """
-
-    corner: Corner  # its south-western point
-    depths: Array  # (n, m) by north and east [m]
-
-    def depth(self, north: float, east: float) -> float:
-        """Depth of the sea floor [m] at a place in NED [m]."""
-        i, s = _cell((north - self.corner.north) / self.corner.to_north, self.depths.shape[0])
-        j, t = _cell((east - self.corner.east) / self.corner.to_east, self.depths.shape[1])
-        (a, b), (c, d) = self.depths[i : i + 2, j : j + 2].tolist()
-        return (a * (1.0 - t) + b * t) * (1.0 - s) + (c * (1.0 - t) + d * t) * s
-
-
 def build_terrain(settings: TerrainSettings, sea_floor: float) -> Terrain:
     """The sea floor of settings.
 
@@ -127,18 +104,13 @@ def build_terrain(settings: TerrainSettings, sea_floor: float) -> Terrain:
             direction = math.radians(settings.direction_deg)
             to_north, to_east = settings.gradient * math.cos(direction), settings.gradient * math.sin(direction)
             return SlopedFloor(sea_floor, to_north, to_east)
+        case SeabedSettings():
+            return make(settings, sea_floor)  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
         case DepthGridSettings():
             path = Path(settings.file)
             modified = path.stat().st_mtime_ns if path.is_file() else 0
             return _read(settings, modified)  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
     return FlatFloor(sea_floor)
-
-
-def _cell(at: float, count: int) -> tuple[int, float]:
-    """Number of the cell in which a place [spacings] is, and the share of the cell before it, held at the edges."""
-    at = min(max(at, 0.0), count - 1.0)
-    cell = min(int(at), count - 2)
-    return cell, at - cell
 
 
 @lru_cache(maxsize=8)

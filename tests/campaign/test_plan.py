@@ -153,7 +153,9 @@ def test_the_shipped_plan() -> None:
     assert found.settings.trials == 200
     assert len(found.variants) == 3
     assert len({found.values(name, 0)["estimator"]["kind"] for name in found.variants}) == 3
-    with pytest.raises(InputError, match=r"no plan 'navigator': .*shipped \(lauv_docking, navigators, rov_docking\)"):
+    with pytest.raises(
+        InputError, match=r"no plan 'navigator': .*shipped \(lauv_docking, navigators, remus100_water, rov_docking\)"
+    ):
         plan.load("navigator")
 
 

@@ -13,7 +13,7 @@ LAUV = {"vehicle": {"model": "lauv"}}
 
 def test_they_replace_defaults_and_give_way_to_a_scenario():
     control = loading.load_scenario(**LAUV).lone[1].control
-    assert control == AutopilotSettings(heading_gain=0.7, yaw_rate_gain=0.5, pitch_gain=1.5, pitch_rate_gain=1.0)
+    assert control == AutopilotSettings(heading_gain=0.7, yaw_rate_gain=0.5, pitch_gain=1.0, pitch_rate_gain=0.5)
     pinned = loading.load_scenario(**LAUV, control={"heading_gain": 1.1}).lone[1].control
     assert (pinned.heading_gain, pinned.yaw_rate_gain) == (1.1, 0.5)
     assert loading.load_scenario().lone[1].control == AutopilotSettings()

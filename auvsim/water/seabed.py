@@ -1,0 +1,152 @@
+"""A sea floor made from a seed: fractal roughness, ripples, rocks, a pipeline; depths and echo strength on a grid.
+
+The roughness is a Gaussian field whose spectrum falls with a power of the wave number (Jackson and Richardson 2007,
+High-Frequency Seafloor Acoustics, ch. 6), drawn by a fast Fourier transform.
+"""
+
+import math
+from functools import lru_cache
+from typing import Literal
+
+import numpy as np
+from numpy.random import Generator
+from pydantic import Field, model_validator
+
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
+from auvsim.base.settings import Settings
+from auvsim.water.terrain_grid import Corner, GriddedFloor
+
+MOST_CELLS = 4097 * 4097
+ROCK_ECHO = 10.0  # backscatter of rock by that of sand: some 10 dB at grazing angles of 10 to 60 deg (ibid., fig. G.1)
+PIPE_ECHO = 15.0  # of a steel or concrete pipe; assumed
+
+
+class PipelineSettings(Settings):
+    """A straight pipeline on the sea floor."""
+
+    north: float = Field(default=0.0, description="of a point on it [m]")
+    east: float = Field(default=0.0, description="of that point [m]")
+    heading_deg: float = Field(default=90.0, description="direction in which it runs, from north [deg]")
+    diameter: float = Field(default=0.5, gt=0.05, le=3.0, description="[m]")
+
+
+class SeabedSettings(Settings):
+    """A sea floor made from a seed, `sea_floor` deep on average; beyond its edge it stays as deep as there."""
+
+    kind: Literal["generated"] = "generated"
+    seed: int = Field(default=0, ge=0, description="of roughness and rocks; the same seed makes the same floor")
+    center: tuple[float, float] = Field(default=(0.0, 0.0), description="north, east of its middle [m]")
+    extent: float = Field(default=256.0, ge=10.0, le=5000.0, description="length of its sides [m]")
+    spacing: float = Field(default=0.25, ge=0.05, le=10.0, description="between its points [m]")
+    roughness: float = Field(default=0.3, ge=0.0, le=10.0, description="rms height of the fractal part [m]")
+    exponent: float = Field(
+        default=3.25, ge=2.1, le=4.0, description="with which its spectrum falls with the wave number [-]"
+    )
+    longest: float = Field(default=60.0, gt=0.0, description="longest wave of the fractal part [m]")
+    ripple_height: float = Field(default=0.0, ge=0.0, le=1.0, description="from trough to crest [m]")
+    ripple_length: float = Field(default=1.0, ge=0.1, le=50.0, description="from crest to crest [m]")
+    ripple_direction_deg: float = Field(default=0.0, description="across the crests, from north [deg]")
+    rocks: float = Field(default=0.01, ge=0.0, le=1.0, description="number of rocks and debris [1/m2]")
+    rock_radius: float = Field(default=0.3, gt=0.0, le=5.0, description="their median; sizes are log-normal [m]")
+    pipeline: PipelineSettings | None = Field(default=None, description="none: there is none")
+
+    @model_validator(mode="after")
+    def _fits(self) -> "SeabedSettings":
+        cells = (self.extent / self.spacing + 1.0) ** 2
+        if cells > MOST_CELLS:
+            raise ValueError(
+                f"extent {self.extent:g} m at spacing {self.spacing:g} m has {cells:.2g} points, at most "
+                f"{MOST_CELLS:.2g}: give a spacing of {self.extent / (math.sqrt(MOST_CELLS) - 1.0):.2g} m or more"
+            )
+        return self
+
+
+@lru_cache(maxsize=4)
+def make(settings: SeabedSettings, sea_floor: float) -> GriddedFloor:
+    """The sea floor of settings around a mean depth [m].
+
+    Raises:
+        InputError: it would rise out of the water.
+    """
+    count = round(settings.extent / settings.spacing) + 1
+    axis = np.asarray(settings.spacing * (np.arange(count) - 0.5 * (count - 1)), dtype=np.float64)
+    heights = settings.roughness * fractal(
+        count, settings.spacing, settings.exponent, settings.longest, stream(settings.seed, 0, "seabed/roughness")
+    )
+    direction = math.radians(settings.ripple_direction_deg)
+    along = math.cos(direction) * axis[:, None] + math.sin(direction) * axis[None, :]
+    heights += 0.5 * settings.ripple_height * np.cos(2.0 * math.pi / settings.ripple_length * along)
+    strength = np.ones((count, count), dtype=np.float32)
+    _lay_pipeline(settings, axis, heights, strength)
+    _place_rocks(settings, axis, heights, strength, stream(settings.seed, 0, "seabed/rocks"))
+    depths = sea_floor - heights
+    if depths.min() < 0.5:
+        raise InputError(
+            f"terrain: the generated floor rises to {depths.min():.1f} m; make sea_floor ({sea_floor:g} m) deeper or "
+            "roughness less"
+        )
+    north, east = settings.center
+    corner = Corner(north + float(axis[0]), east + float(axis[0]), settings.spacing, settings.spacing)
+    return GriddedFloor(corner, depths, strength)
+
+
+def fractal(count: int, spacing: float, exponent: float, longest: float, generator: Generator) -> Array:
+    """A Gaussian field (count, count) of unit variance, whose spectrum falls as wave number ** -exponent.
+
+    It is drawn on twice its size and cut, since the transform's field repeats.
+
+    Args:
+        count: points along a side.
+        spacing: between them [m].
+        exponent: of the two-dimensional spectrum.
+        longest: wave; the spectrum is flat for longer ones [m].
+        generator: of its phases and amplitudes.
+    """
+    size = 1 << (2 * count - 1).bit_length() - 1 if count > 1 else 2
+    size = max(size, count)
+    k = 2.0 * math.pi * np.fft.fftfreq(size, spacing)
+    number = np.hypot(k[:, None], k[None, : size // 2 + 1])
+    floor = 2.0 * math.pi / longest
+    amplitude = np.maximum(number, floor) ** (-0.5 * exponent)
+    amplitude[0, 0] = 0.0
+    white = np.fft.rfft2(generator.standard_normal((size, size)))
+    field = np.fft.irfft2(white * amplitude[:, : white.shape[1]], s=(size, size))
+    weights = np.full(white.shape[1], 2.0)
+    weights[0] = weights[-1] = 1.0 if size % 2 == 0 else 2.0
+    weights[0] = 1.0
+    deviation = math.sqrt(float((amplitude[:, : white.shape[1]] ** 2 * weights).sum())) / size
+    return field[:count, :count] / deviation
+
+
+def _lay_pipeline(settings: SeabedSettings, axis: Array, heights: Array, strength: np.ndarray) -> None:
+    pipe = settings.pipeline
+    if pipe is None:
+        return
+    heading = math.radians(pipe.heading_deg)
+    north, east = axis + settings.center[0] - pipe.north, axis + settings.center[1] - pipe.east
+    across = math.cos(heading) * east[None, :] - math.sin(heading) * north[:, None]
+    radius = 0.5 * pipe.diameter
+    on = np.abs(across) < radius
+    # It lies on the floor's own profile; its upper half is all that a height field can show.
+    top = radius + np.sqrt(np.maximum(radius**2 - across**2, 0.0))
+    heights[on] += top[on]
+    strength[on] = PIPE_ECHO
+
+
+def _place_rocks(
+    settings: SeabedSettings, axis: Array, heights: Array, strength: np.ndarray, generator: Generator
+) -> None:
+    """Half-buried spheres."""
+    count = generator.poisson(settings.rocks * settings.extent**2)
+    places = generator.uniform(axis[0], axis[-1], (count, 2))
+    radii = settings.rock_radius * np.exp(0.4 * generator.standard_normal(count))
+    for (north, east), radius in zip(places.tolist(), radii.tolist(), strict=True):
+        i0, i1 = np.searchsorted(axis, (north - radius, north + radius))
+        j0, j1 = np.searchsorted(axis, (east - radius, east + radius))
+        square = (axis[i0:i1, None] - north) ** 2 + (axis[None, j0:j1] - east) ** 2
+        rise = np.sqrt(np.maximum(radius**2 - square, 0.0))
+        on = rise > 0.0
+        heights[i0:i1, j0:j1] += rise
+        strength[i0:i1, j0:j1][on] = ROCK_ECHO

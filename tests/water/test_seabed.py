@@ -1,0 +1,69 @@
+"""The generated sea floor: its spectrum, its seed, and what lies on it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from auvsim.base.errors import InputError
+from auvsim.water import seabed
+from auvsim.water.seabed import PipelineSettings, SeabedSettings
+
+
+def test_variance_and_spectrum_of_the_fractal() -> None:
+    """Unit variance over many floors, and a spectrum that falls as the wave number to the power asked for."""
+    fields = [seabed.fractal(256, 0.5, 3.0, 16.0, np.random.default_rng(k)) for k in range(12)]
+    # Twelve fields of some 60 independent patches each: 3 standard errors of their variance are about 0.16.
+    assert np.mean([field.var() for field in fields]) == pytest.approx(1.0, abs=0.16)
+    window = np.hanning(256)
+    spectrum = np.mean([np.abs(np.fft.fft2(f * np.outer(window, window))) ** 2 for f in fields], axis=0)
+    k = 2.0 * math.pi * np.fft.fftfreq(256, 0.5)
+    number = np.hypot(k[:, None], k[None, :])
+    on = (number > 1.0) & (number < 4.0)
+    slope = np.polyfit(np.log(number[on]), np.log(spectrum[on]), 1)[0]
+    assert slope == pytest.approx(-3.0, abs=0.1)
+
+
+def test_same_seed_same_floor() -> None:
+    """Bit for bit; another seed makes another; rocks do not change the roughness."""
+    one, same, other, bare = (
+        seabed.make(SeabedSettings(extent=40.0, seed=seed, rocks=rocks), 20.0)
+        for seed, rocks in ((1, 0.05), (1, 0.05), (2, 0.05), (1, 0.0))
+    )
+    np.testing.assert_array_equal(one.depths, same.depths)
+    assert np.abs(one.depths - other.depths).max() > 0.1
+    sand = one.strength == 1.0
+    assert 0.5 < sand.mean() < 1.0
+    np.testing.assert_array_equal(one.depths[sand], bare.depths[sand])
+
+
+def test_pipeline_and_ripples() -> None:
+    """A pipe rises by its diameter along its line, elsewhere the floor is level; ripples have their height."""
+    flat = {"roughness": 0.0, "rocks": 0.0, "extent": 40.0, "spacing": 0.1}
+    pipe = PipelineSettings(north=3.0, east=0.0, heading_deg=30.0, diameter=0.6)
+    floor = seabed.make(SeabedSettings(**flat, pipeline=pipe), 20.0)
+    for t in (-8.0, 0.0, 5.0):
+        n, e = 3.0 + t * math.cos(math.pi / 6.0), t * math.sin(math.pi / 6.0)
+        assert floor.depth(n, e) == pytest.approx(19.4, abs=0.05)  # points stand 0.1 m apart
+        assert floor.depth(n + 0.5, e - 0.87) == pytest.approx(20.0)  # 1 m to port
+    rippled = seabed.make(SeabedSettings(**flat, ripple_height=0.2, ripple_length=2.0, ripple_direction_deg=90.0), 20.0)
+    assert np.ptp(rippled.depths) == pytest.approx(0.2, rel=1e-3)
+    np.testing.assert_allclose(rippled.depths[0], rippled.depths[-1])
+
+
+def test_coarse_floor_lies_on_the_fine_one() -> None:
+    """What MuJoCo touches are points of the floor itself, edge to edge."""
+    floor = seabed.make(SeabedSettings(extent=100.0, spacing=0.25), 20.0)
+    coarse = floor.coarse(51)
+    assert coarse.depths.shape == (51, 51)
+    for i, j in ((0, 0), (50, 50), (7, 31)):
+        n, e = coarse.corner.north + i * coarse.corner.to_north, coarse.corner.east + j * coarse.corner.to_east
+        assert coarse.depths[i, j] == pytest.approx(floor.depth(n, e), abs=1e-9)
+
+
+def test_what_cannot_be_is_refused() -> None:
+    """A floor out of the water, and one of too many points, each with what would be right."""
+    with pytest.raises(InputError, match="generated floor rises to"):
+        seabed.make(SeabedSettings(extent=40.0, roughness=8.0), 5.0)
+    with pytest.raises(ValueError, match=r"give a spacing of 1\.2 m or more"):
+        SeabedSettings(extent=5000.0, spacing=0.1)
