@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse as EllipsePatch
 
-from auvsim.analysis.style import SIZE, dress, legend, save, vehicle_colour
+from auvsim.analysis.style import SIZE, dress, save, vehicle_colour
 from auvsim.base import yaml_text
 from auvsim.base.frames import Array
 from auvsim.data.log import Log, VehicleLog
@@ -47,7 +47,9 @@ def formation_figure(log: Log) -> Figure:
     entries: dict[str, Any] = {}
     for axes in figure.axes:
         entries |= dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    legend(figure, entries)
+    style: dict[str, Any] = {"fontsize": 9.5, "frameon": False, "columnspacing": 1.4}
+    columns = (len(entries) + 1) // 2
+    figure.legend(list(entries.values()), list(entries), loc="outside lower center", ncols=columns, **style)
     figure.suptitle(f"Formation: trial {log.attributes['trial']}, seed {log.attributes['seed']}", fontsize=12)
     return figure
 
@@ -97,8 +99,7 @@ def _stations(axes: Axes, log: Log, names: list[str]) -> None:
     for index, name in enumerate(names):
         time, errors = station_errors(log.vehicle(name))
         axes.plot(time, np.hypot(errors[:, 0], errors[:, 1]), color=vehicle_colour(index), lw=1.3)
-    axes.set_yscale("symlog", linthresh=1.0)
-    axes.set_ylim(bottom=0.0)
+    _metres(axes)
     dress(axes, "True distance from the station", "", "distance [m]")
 
 
@@ -115,9 +116,8 @@ def _positions(axes: Axes, log: Log, names: list[str]) -> None:
             claimed = np.sqrt(np.trace(estimate["covariance"][good, :2, :2], axis1=1, axis2=2))
             axes.plot(time, claimed, "--", color=vehicle_colour(index), lw=1.2, label="rms that its filter claims")
             bound = np.where(np.isfinite(mission["bound"]), mission["bound"], np.nan)
-            axes.plot(mission["time"], bound, ":", color="black", lw=1.8, label="bound by which it chooses its station")
-    axes.set_yscale("symlog", linthresh=1.0)
-    axes.set_ylim(bottom=0.0)
+            axes.plot(mission["time"], bound, ":", color="black", lw=1.8, label="bound it assumes")
+    _metres(axes)
     dress(axes, "Error of the estimated position", "", "error [m]")
 
 
@@ -132,3 +132,13 @@ def _heard(axes: Axes, log: Log, names: list[str]) -> None:
     axes.set_ylim(-0.2, most + 0.3)
     axes.set_yticks(range(most + 1))
     dress(axes, "Leaders that are not silent", "time [s]", "leaders")
+
+
+def _metres(axes: Axes) -> None:
+    """An axis of distances from centimetres to hundreds of metres, linear up to 1 m."""
+    axes.set_yscale("symlog", linthresh=1.0)
+    top = max(axes.get_ylim()[1], 2.0)
+    axes.set_ylim(0.0, top)
+    ticks = [tick for tick in (0.0, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0) if tick <= top]
+    axes.set_yticks(ticks, labels=[f"{tick:g}" for tick in ticks])
+    axes.set_yticks((), minor=True)

@@ -19,19 +19,11 @@ def is_manoeuvre(log: Log) -> bool:
 
 
 def plots(log: Log, folder: Path) -> None:
-<<<<<<< HEAD
-    """Draws track.png and estimates.png; of a manoeuvre one picture of its name; of several vehicles fleet.png.
-
-    Of a formation formation.png as well.
-    """
-    from auvsim.analysis import fleet_plots, formation_plots, manoeuvre_plots, plots
-=======
     """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png.
 
-    Where vehicles have modems also packets.png.
+    Where vehicles have modems also packets.png, and where some are in formation formation.png.
     """
-    from auvsim.analysis import fleet_plots, manoeuvre_plots, network_plots, plots
->>>>>>> main
+    from auvsim.analysis import fleet_plots, formation_plots, manoeuvre_plots, network_plots, plots
     from auvsim.missions.manoeuvres import laws
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 

@@ -20,7 +20,6 @@ FIX: Colour = (0.95, 0.97, 1.0, 1.0)
 REFUSED: Colour = (1.0, 0.15, 0.1, 1.0)
 CURRENT: Colour = (0.45, 0.95, 1.0, 1.0)
 DOCK: Colour = (1.0, 0.55, 0.2, 1.0)
-RANGE: Colour = (1.0, 1.0, 1.0, 0.85)
 MOTE: Colour = (0.75, 0.92, 0.92, 1.0)
 
 FLEET: tuple[Colour, ...] = (  # of several vehicles, each with colours of its own
@@ -30,7 +29,6 @@ FLEET: tuple[Colour, ...] = (  # of several vehicles, each with colours of its o
 SIGMAS = 2.0  # of the ellipse round the estimate
 MOTES, MOTE_CUBE = 90, 11.0  # specks in the water round the vehicle, and the side of the cube they fill [m]
 ARROW_TIME = 7.0  # [s]
-RANGE_TIME = 2.0  # for which a range that a modem has measured is drawn [s]
 GATE_DISTANCE = 200.0  # length of a dock's axis where the log does not say how far its gate is [m]
 STILL_WATER = 0.01  # slower water has no arrows [m/s]
 
@@ -164,11 +162,7 @@ class FarMarks:
         self.layer = Layer(playback, marks, overview=True)
         self._floor = playback.model.geom("sea_floor").pos[2]
         self._stations = _stations(playback, unit)
-<<<<<<< HEAD
-        self._heard = {name: _heard(motion, playback) for name, motion in playback.motions.items()}
-=======
         self._pulses = Pulses(playback)
->>>>>>> main
 
     def update(self, moment: Moment) -> None:
         """Draws the moment."""
@@ -184,19 +178,8 @@ class FarMarks:
                 _ellipse(layer, now.belief, 0.02 * unit)
                 layer.ball((0.5 * unit,) * 3, now.belief.position, np.eye(3), ESTIMATE)
             layer.join(ARROW, 0.6 * unit, now.position - forward, now.position + forward, tracks.colour)
-<<<<<<< HEAD
-        self._ranges(moment)
-=======
         self._pulses.draw(layer, moment.time)
->>>>>>> main
         self._flow(moment.followed.current)
-
-    def _ranges(self, moment: Moment) -> None:
-        """Lines between those of whom one has just heard the other at a range."""
-        for name, (times, sources) in self._heard.items():
-            first, last = np.searchsorted(times, (moment.time - RANGE_TIME, moment.time), side="right")
-            for source in sorted(set(sources[first:last])):
-                self.layer.join(LINE, 2.5, moment.vehicles[source].position, moment.vehicles[name].position, RANGE)
 
     def _flow(self, current: Array) -> None:
         """Arrows of the current (3,) [m/s] at every station."""
@@ -207,15 +190,6 @@ class FarMarks:
         half, width = 0.5 * length * current / speed, min(0.14 * self.unit, 0.08 * length)
         for station in self._stations:
             self.layer.join(ARROW, width, station - half, station + half, (*CURRENT[:3], 0.75))
-
-
-def _heard(motion: Motion, playback: Playback) -> tuple[Array, list[str]]:
-    """When [s] a vehicle's modem measured ranges, in order, and to whom."""
-    if "received" not in motion.log:
-        return np.empty(0), []
-    rows = motion.log["received"]
-    kept = [k for k in np.flatnonzero(np.isfinite(rows["range"])) if str(rows["source"][k]) in playback.motions]
-    return rows["time"][kept], [str(rows["source"][k]) for k in kept]
 
 
 def _stations(playback: Playback, unit: float) -> list[Array]:

@@ -153,8 +153,8 @@ class Formation(Mission):
                 why = f"{len(names)} leader heard" if len(names) == 1 else "no leader heard"
                 self._enter(ALONE, time, f"{why}, two are needed: keeps station by dead reckoning")
             return
-        before = choice.bound_at(self._choice.station, places, sigma, s.speed, s.follow.period, s.follow)
-        best = choice.choose(self._planned, places, sigma, s.speed, s.follow.period, s.follow)
+        before = choice.bound_at(self._choice.station, places, sigma, s.speed, s.follow.interval, s.follow)
+        best = choice.choose(self._planned, places, sigma, s.speed, s.follow.interval, s.follow)
         moves = best.bound < WORTH * before
         if self.phase == ALONE:
             self._enter(ON_STATION, time, f"goes on with {', '.join(names)}")

@@ -13,8 +13,9 @@ class ChoiceSettings(Settings):
     reach: float = Field(default=0.0, ge=0.0, description="distance from the planned station; 0: it keeps that [m]")
     apart: float = Field(default=20.0, gt=0.0, description="least distance from any station it knows of [m]")
     period: float = Field(default=20.0, gt=0.0, description="time between two looks at what is heard [s]")
+    interval: float = Field(default=6.0, gt=0.0, description="time between two words of a leader [s]")
     range_noise: float = Field(default=1.0, gt=0.0, description="error of ranges that the bound assumes, sd [m]")
-    drift: float = Field(default=0.1, gt=0.0, description="error of the speed that it assumes, sd [m/s]")
+    drift: float = Field(default=0.05, gt=0.0, description="error of the speed that it assumes, sd [m/s]")
 
 
 class FormationSettings(Settings):
