@@ -15,6 +15,7 @@ PRINTED = {  # what shows that a notebook came to its point
     "02_docking_navigation": ["loses to the paper's filter: none", "not met: none"],
     "03_identification": ["these are degrees", "below 2 %: True; better than its start: True", "lake.yaml  docked"],
     "04_cooperative": ["twenty times worse in silence: True", "m longer: True"],
+    "05_formations": ["[  0.  60. 120.] degrees", "worse, and claims to be better: True"],
     "07_campaign": ["8 trials, then 12", "the same to the last bit: True"],
 }
 

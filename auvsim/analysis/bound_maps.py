@@ -120,7 +120,7 @@ def draw(
     if not seen.all():
         region = np.where(seen, 0.0, 1.0)
         axes.contourf(east, north, region, levels=(0.5, 1.5), colors=["#dddddd"], hatches=["////"], zorder=1.5)
-        what = f"blind: above {blind:g} m" if math.isfinite(blind) else "blind: no bound"
+        what = f"blind: above {blind:.3g} m" if math.isfinite(blind) else "blind: no bound"
         handles.append(Patch(facecolor="#dddddd", edgecolor="#222222", hatch="////", label=what))
     for region in regions:
         if np.any(region.inside):

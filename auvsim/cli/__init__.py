@@ -156,10 +156,11 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    paper: Annotated[Literal["paper1", "paper2", "paper3", "paper5"], tyro.conf.Positional]
+    paper: Annotated[Literal["paper1", "paper2", "paper3", "paper4", "paper5"], tyro.conf.Positional]
     """paper1: navigation to a dock by USBL (Qiu and Li 2019).
     paper2: ranges to a leader in an unknown current.
     paper3: cooperative localisation with late packets (Yao et al. 2011).
+    paper4: where leaders are to stand, by ranges (Li et al. 2023).
     paper5: a path from sonar frames of the sea floor (2009)."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
@@ -283,6 +284,36 @@ class Estimate:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Formation:
+    """Shows what ranges to leaders tell a follower: a map of the least error, and the best move of each leader.
+
+    Writes formation.png and formation.csv. `auvsim formation --leaders "0,1000;-866,-500;866,-500"`. A depth may follow
+    each place; the follower knows its own by a gauge. Where a list begins with a minus, write `--leaders="-866,...`.
+    """
+
+    leaders: Annotated[str, tyro.conf.arg(metavar='"NORTH,EAST;..."')]
+    """Places of the leaders [m]."""
+    follower: Annotated[str, tyro.conf.arg(metavar='"NORTH,EAST"')] = "0,0"
+    """Place of the follower [m]."""
+    noise: str = "2"
+    """Standard deviation of the ranges, one for all or one each [m]."""
+    speed: float = 1.0
+    """Speed of all [m/s]."""
+    heading_deg: float = 0.0
+    """Heading of all, clockwise from north [deg]."""
+    step: float = 1.0
+    """Time between two sets of ranges [s]."""
+    reach: float = 200.0
+    """How far each leader can move [m]."""
+    modem: float = 3000.0
+    """Greatest range of the modem [m]."""
+    apart: float = 20.0
+    """Least distance between vehicles [m]."""
+    out: Path = Path("out")
+    """Folder of the table and the map."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """Runs one of the studies behind the figures of the README; without a name lists them."""
 
@@ -318,6 +349,7 @@ Command = (
     | Plot
     | Metrics
     | Reproduce
+    | Formation
     | Study
     | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
@@ -517,6 +549,15 @@ def _run(arguments: list[str]) -> int:
             command.paper, quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs,
             truth=command.truth,
         )  # fmt: skip
+
+    if isinstance(command, Formation):
+        from auvsim.cli import formation
+
+        judged = formation.formation(
+            command.leaders, command.follower, command.noise, speed=command.speed, heading_deg=command.heading_deg,
+            step=command.step, reach=command.reach, modem=command.modem, apart=command.apart,
+        )  # fmt: skip
+        return formation.run(judged, command.out)
 
     from auvsim.cli import products
 

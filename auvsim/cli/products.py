@@ -21,9 +21,9 @@ def is_manoeuvre(log: Log) -> bool:
 def plots(log: Log, folder: Path) -> None:
     """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png.
 
-    Where vehicles have modems also packets.png.
+    Where vehicles have modems also packets.png, and where some are in formation formation.png.
     """
-    from auvsim.analysis import fleet_plots, manoeuvre_plots, network_plots, plots
+    from auvsim.analysis import fleet_plots, formation_plots, manoeuvre_plots, network_plots, plots
     from auvsim.missions.manoeuvres import laws
     from auvsim.missions.manoeuvres import metrics as manoeuvre_metrics
 
@@ -38,6 +38,9 @@ def plots(log: Log, folder: Path) -> None:
     if len(log.vehicles) > 1:
         with whole(folder / "fleet.png") as partial:
             fleet_plots.fleet(log, partial)
+        if formation_plots.in_formation(log):
+            with whole(folder / "formation.png") as partial:
+                formation_plots.formation(log, partial)
         return
     for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
         with whole(folder / name) as partial:

@@ -11,6 +11,8 @@ from auvsim.base.errors import AuvsimError, InputError
 from auvsim.base.settings import OwnPart, tag_by_kind
 from auvsim.missions import contract
 from auvsim.missions.docking.guidance import Docking, DockingSettings
+from auvsim.missions.formation.mission import Formation
+from auvsim.missions.formation.settings import FormationSettings
 from auvsim.missions.hovering.docking import HoveringDocking, HoveringDockingSettings
 from auvsim.missions.hovering.hold import Hold, HoldSettings
 from auvsim.missions.manoeuvres.mission import Manoeuvre
@@ -29,10 +31,17 @@ MissionSettings = Annotated[
     | Annotated[TrackSettings, Tag("TrackSettings")]
     | Annotated[HoldSettings, Tag("HoldSettings")]
     | Annotated[HoveringDockingSettings, Tag("HoveringDockingSettings")]
+    | Annotated[FormationSettings, Tag("FormationSettings")]
     | Annotated[OwnMission, Tag("OwnMission")],
     Discriminator(
         tag_by_kind(
-            DockingSettings, ManoeuvreMissionSettings, TrackSettings, HoldSettings, HoveringDockingSettings, OwnMission
+            DockingSettings,
+            ManoeuvreMissionSettings,
+            TrackSettings,
+            HoldSettings,
+            HoveringDockingSettings,
+            FormationSettings,
+            OwnMission,
         )
     ),
 ]
@@ -41,6 +50,7 @@ MISSIONS: dict[str, type[Mission]] = {
     "manoeuvre": Manoeuvre,
     "track": Track,
     "hold": Hold,
+    "formation": Formation,
     "hovering_docking": HoveringDocking,
 }
 

@@ -77,6 +77,25 @@ def correct_iterated(
     return result, first
 
 
+def correct_second_order(
+    belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None
+) -> tuple[Gaussian, Innovation]:
+    """As `correct`, with the model's second derivatives (Gaussian second-order filter).
+
+    The value expected is larger by half the trace of A P, and its noise by half the trace of A P B P, of the second
+    derivatives A and B of two components. Source: Bar-Shalom, Li, Kirubarajan (2001), 10.3.3.
+    """
+    if model.is_linear:
+        return correct(belief, measurement, model, gate)
+    x = belief.mean
+    expected, H = model.shown(x, measurement)
+    spread = model.hessian(x, measurement) @ belief.covariance  # (m, n, n)
+    shift = 0.5 * np.trace(spread, axis1=1, axis2=2)
+    R = model.covariance(x, measurement) + 0.5 * np.einsum("aij,bji->ab", spread, spread)
+    residual = model.residual(measurement.value, expected + shift)
+    return correct_linear(belief, H, residual, R, math.inf if gate is None else chi_square(gate, residual.size))
+
+
 def correct_linear(
     belief: Gaussian, H: Array, residual: Array, R: Array, limit: float = math.inf
 ) -> tuple[Gaussian, Innovation]:

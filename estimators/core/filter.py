@@ -22,8 +22,13 @@ from estimators.core.types import (
     model_of,
 )
 
-Transform = Literal["extended", "unscented", "iterated"]
-TRANSFORMS = {"extended": ekf.correct, "unscented": ukf.correct, "iterated": ekf.correct_iterated}
+Transform = Literal["extended", "unscented", "iterated", "second_order"]
+TRANSFORMS = {
+    "extended": ekf.correct,
+    "unscented": ukf.correct,
+    "iterated": ekf.correct_iterated,
+    "second_order": ekf.correct_second_order,
+}
 OUTLIER = "outlier"
 
 # (nodes, index) -> the belief at a node and which of its measurements are in it; None if they do not suffice
@@ -57,7 +62,8 @@ class ModelFilter:
         mixtures: Kinds that are weighed against being outliers instead of gated.
         recovery: What to do about a source that is rejected again and again; None: nothing.
         recoveries: The same of some kinds.
-        transform: "extended", "unscented", or "iterated" where a measurement says more of a state than its belief.
+        transform: "extended", "unscented", "iterated" where a measurement says more of a state than its belief, or
+            "second_order" where a value is curved over it, as ranges across a line of beacons.
     """
 
     def __init__(

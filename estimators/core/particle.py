@@ -100,9 +100,8 @@ class ParticleFilter:
                 state = state._replace(verdicts=(*state.verdicts, (measurement, NO_MODEL, math.nan)))
                 continue
             R = model.covariance(state.particles[0], measurement)
-            errors = np.array(
-                [model.residual(measurement.value, model.evaluate(x, measurement)) for x in state.particles]
-            )
+            shown = model.evaluate_each(state.particles, measurement)
+            errors = np.array([model.residual(measurement.value, value) for value in shown])
             squares = np.einsum("km,km->k", errors, np.linalg.solve(R, errors.T).T)
             likelihoods = (1.0 - self._tail) * np.exp(-0.5 * squares) + self._tail / self._reach
             weights = state.weights * likelihoods

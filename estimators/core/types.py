@@ -120,6 +120,20 @@ class MeasurementModel(Protocol):
         """Derivative of `evaluate` with respect to `x`, (m, n)."""
         ...
 
+    def hessian(self, x: Array, measurement: Measurement) -> Array:
+        """Second derivatives of `evaluate`, (m, n, n): for second-order filters; by differences of `jacobian`."""
+        steps = 1e-4 * np.maximum(1.0, np.abs(x))
+        columns = [
+            (self.jacobian(x + offset, measurement) - self.jacobian(x - offset, measurement)) / (2.0 * step)
+            for step, offset in zip(steps, np.diag(steps), strict=True)
+        ]
+        result = np.stack(columns, axis=-1)
+        return 0.5 * (result + np.swapaxes(result, 1, 2))
+
+    def evaluate_each(self, points: Array, measurement: Measurement) -> Array:
+        """Values (k, m) expected in each of the states `points` (k, n)."""
+        return np.array([self.evaluate(x, measurement) for x in points])
+
     def covariance(self, x: Array, measurement: Measurement) -> Array:
         """Covariance of the measurement's noise, (m, m)."""
         return measurement.covariance
