@@ -156,6 +156,10 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv and the paper's figures as PNG,
+    figures and tables of its own beside them. The same seed gives the same numbers, on however many cores.
+    """
+
     paper: Annotated[Literal["paper1", "paper2", "paper3", "paper4", "paper5"], tyro.conf.Positional]
     """paper1: navigation to a dock by USBL (Qiu and Li 2019).
     paper2: ranges to a leader in an unknown current.
