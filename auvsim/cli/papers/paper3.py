@@ -1,4 +1,4 @@
-"""`auvsim reproduce paper3`: cooperative localisation with late packets, printed as tables, left as CSV and pictures."""
+"""`auvsim reproduce paper3`: cooperative localisation with late packets, as tables, CSV and pictures."""
 
 import math
 import sys
