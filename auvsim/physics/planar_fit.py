@@ -88,7 +88,7 @@ class Level:
         """Force and moment (6,) on a vehicle that moves straight ahead [N, N m], forward-starboard-down."""
         return FLIP6 * self._forward(u, 0.0, 0.0, Commands(rudder, elevator, shaft_speed))[:6]
 
-    def resistance(self, nu: Sequence[float]) -> Array:
+    def resistance(self, nu: Sequence[float] | Array) -> Array:
         """Force and moment (6,) on a vehicle of body velocity `nu` (6,), all actuators at rest; SNAME [N, N m]."""
         data = self.data
         mujoco.mj_resetData(self.model, data)

@@ -223,7 +223,7 @@ def motion_of(truths: list[Truth], rudders: Array) -> Motion:
     """A manoeuvre in still water from its true states, from a heading of north."""
     position, heading = np.array([t.position for t in truths]), np.unwrap([t.attitude[2] for t in truths])
     return Motion(
-        time=PERIOD * np.arange(len(truths)),
+        time=PERIOD * np.arange(len(truths), dtype=np.float64),
         track=position[:, :2] - position[0, :2],
         heading=heading - heading[0],
         velocity=np.array([t.nu[[0, 1, 5]] for t in truths]),

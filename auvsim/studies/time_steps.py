@@ -94,7 +94,7 @@ def _track_table(found: dict, vehicle: str, speed: float) -> Table:
     title = f"{vehicle} at {speed:g} m/s: error of the position after {SECONDS:g} s, open loop [m]"
     table = Table("integrator", *(f"{rate:g} Hz" for rate in RATES), title=title)
     for integrator in INTEGRATORS:
-        errors = [np.linalg.norm(found[integrator, rate] - found["RK4", FINEST]) for rate in RATES]
+        errors = [math.dist(found[integrator, rate], found["RK4", FINEST]) for rate in RATES]
         table.add_row(integrator, *(_number(errors)))
     return table
 
