@@ -47,8 +47,8 @@ def cycle(a: Edge, b: Edge, poses: Array, drift: Array) -> float:
     error[2] = wrapped(error[2])
     end = compose(past_b, back)
     covariance = a.covariance + _carried(to_b, end, b.covariance)
-    covariance = covariance + _path(poses, a.first, b.first, np.zeros(3), end, drift)
-    covariance = covariance + _path(poses, b.second, a.second, past_b, end, drift)
+    covariance = covariance + path_covariance(poses, a.first, b.first, np.zeros(3), end, drift)
+    covariance = covariance + path_covariance(poses, b.second, a.second, past_b, end, drift)
     return float(error @ np.linalg.solve(covariance, error))
 
 
@@ -69,7 +69,7 @@ def largest_clique(agree: np.ndarray) -> list[int]:
     return sorted(best)
 
 
-def _path(poses: Array, first: int, last: int, origin: Array, end: Array, drift: Array) -> Array:
+def path_covariance(poses: Array, first: int, last: int, origin: Array, end: Array, drift: Array) -> Array:
     """Covariance of a stretch of the path, which begins at `origin` of the cycle, seen at the cycle's `end`."""
     if first == last:
         return np.zeros((3, 3))

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from estimators.core.types import Array
-from estimators.map_path.closures import consistent
+from estimators.map_path.closures import consistent, path_covariance
 from estimators.map_path.graph import Edge, GraphSolution, optimise
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Match, Search, match
@@ -102,9 +102,14 @@ def _neighbours(
 
 def edge(first: int, second: int, relative: Array, found: Match, factor: float) -> Edge:
     """A match as an edge: its covariance turned from the later frame's axes into the earlier's."""
-    c, s = np.cos(relative[2]), np.sin(relative[2])
-    turned = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    turned = _turn(relative[2])
     return Edge(first, second, compose(relative, found.offset), factor * turned @ found.covariance @ turned.T)
+
+
+def _turn(angle: float) -> Array:
+    """Matrix (3, 3) from the axes of a pose turned by an angle [rad] to those it was turned from."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def _candidates(
@@ -124,11 +129,13 @@ def _candidates(
         support = [j for j in range(max(nearest - half, 0), nearest + half + 1) if frames[j] is not None and j < k]
         if not support:
             continue
-        gathered = np.square(settings.drift) * (k - nearest)
-        prior = np.diag(gathered + np.array(settings.match_prior) ** 2)
+        relative, drift = between(poses[nearest], poses[k]), np.diag(np.square(settings.drift))
+        turn = _turn(relative[2]).T
+        prior = turn @ path_covariance(poses, nearest, k, np.zeros(3), relative, drift) @ turn.T
+        prior = prior + np.diag(np.square(settings.match_prior))
         relatives = between(poses[support], poses[k])
         earlier = [frames[j] for j in support]
         got = match(matcher, later, earlier, relatives, prior, settings.closure_search)  # pyright: ignore
         if isinstance(got, Match) and got.log_likelihood >= settings.closure_ratio:
-            found.append(edge(nearest, k, between(poses[nearest], poses[k]), got, settings.covariance_factor))
+            found.append(edge(nearest, k, relative, got, settings.covariance_factor))
     return found

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from auvsim.reproduce.paper5.methods import TITLES
-from auvsim.reproduce.paper5.study import REFERENCE, ROWS, Study, paired_ratio
+from auvsim.reproduce.paper5.study import ROWS, Study, paired_ratio
 from auvsim.reproduce.verdict import Verdict
 
 LARGEST_RATIO = {"dp": 0.45, "window": 0.15, "particles": 0.2, "graph": 0.2}  # to dead reckoning
@@ -71,6 +71,3 @@ def _explained(verdict: Verdict, study: Study) -> Verdict:
     else:
         reason = "missed"
     return replace(verdict, reason=reason)
-
-
-__all__ = ["BIAS", "LOCK", "REFERENCE", "verdicts"]
