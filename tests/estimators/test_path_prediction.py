@@ -478,3 +478,19 @@ def test_packet_predicted_to_the_frozen_leader():
     expected = F @ START @ F.T + h**2 * G @ np.diag(q) @ G.T
     np.testing.assert_allclose(method.covariance[3:6, 3:6], expected)
     np.testing.assert_allclose(method.mean[5], first.pose[2] + 0.1)
+
+
+@pytest.mark.parametrize("kind", [CloningFilter, RealTimeFilter])
+def test_error_of_the_leader_moves_with_it(kind):
+    """By Phi = [[1, 0, -east], [0, 1, north], [0, 0, 1]] of what it broadcast, and as uncertain as it says itself."""
+    start = Gaussian(mean=FIRST, covariance=START)
+    method = kind(start, NOISE) if kind is CloningFilter else kind(start, NOISE, LEADER_NOISE)
+    heading = 0.4
+    north, east = 30.0 * math.cos(heading), 30.0 * math.sin(heading)
+    method.receive(packet(0, [5.0, -3.0, heading]))
+    method.mean[3:6] = [1.0, 2.0, 0.1]
+    Phi = np.array([[1.0, 0.0, -east], [0.0, 1.0, north], [0.0, 0.0, 1.0]])
+    grown = Phi @ START @ Phi.T + kinematics.odometry_covariance(heading, 3.0, 10.0, *LEADER_NOISE)
+    method.receive(packet(1, [5.0 + north, -3.0 + east, heading], grown))
+    np.testing.assert_allclose(method.mean[3:6], Phi @ [1.0, 2.0, 0.1], atol=1e-6)
+    np.testing.assert_allclose(method.covariance[3:6, 3:6], grown, rtol=1e-9)

@@ -60,14 +60,14 @@ def timing(seed: int) -> Figure:
                 continue
             colour = COLOURS["iiru"] if is_packet else COLOURS["ekf"]
             axes.annotate("", (arrived, 0.0), (sent, 1.0), arrowprops={"arrowstyle": "->", "color": colour, "lw": 1.6})
-            low_text = -0.32 if is_packet else -0.12
+            low_text = -0.28 - 0.14 * (event.number % 2) if is_packet else -0.12
             axes.text(
                 arrived, low_text, f"{'packet' if is_packet else 'pulse'} {event.number}", color=colour, ha="center"
             )
         axes.axhline(1.0, color="#444444", lw=1.0)
         axes.axhline(0.0, color="#444444", lw=1.0)
         axes.set_yticks([0.0, 1.0], ["follower", "leader"])
-        axes.set_ylim(-0.45, 1.2)
+        axes.set_ylim(-0.52, 1.2)
         axes.set_xlim(low, high)
         dress(axes, title, "time [s]", "")
     return figure
