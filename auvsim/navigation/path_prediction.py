@@ -144,9 +144,8 @@ class PathPredictionNavigator:
             if reason:
                 continue
             stamp = m.sent if m.kind == PULSE else m.payload[0]
-            if self._first is None:
-                self._first = stamp
-            number = round((stamp - self._first) / s.period)
+            self._first = first = stamp if self._first is None else self._first
+            number = round((stamp - first) / s.period)
             if delivery.range is not None and (m.kind == PULSE or abs(stamp - m.sent) < 0.01):
                 arrival = Listener(self._modem).arrival(delivery)
                 pulse = Pulse(number, stamp, arrival, self._flat(delivery), self._range_sd**2)
