@@ -216,3 +216,15 @@ def test_a_place_is_held_by_ones_own_sensors():
     assert found["position_rms"] < 0.3
     assert found["depth_rms"] < 0.3
     assert found["heading_rms_deg"] < 3.0  # the compass' bias is 0.5 deg, its error seen in the heading besides
+
+
+def test_within_the_cage_it_goes_on_whatever_it_shows():
+    """There the walls lead it; to wait would leave it in the flare."""
+    mission = HoveringDocking(setup(HoveringDockingSettings()))
+    vehicle = Follower(mission, -6.0, 0.0)
+    vehicle.until(lambda: vehicle.nose()[0] > 0.1)
+    along, vehicle.off = vehicle.nose()[0], 0.3
+    for _ in range(20):
+        vehicle.step()
+    assert mission.cross > HoveringDockingSettings().corridor - 0.05 or mission.along > along + 0.2
+    assert vehicle.nose()[0] - along > 0.1
