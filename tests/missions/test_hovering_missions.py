@@ -223,8 +223,7 @@ def test_within_the_cage_it_goes_on_whatever_it_shows():
     mission = HoveringDocking(setup(HoveringDockingSettings()))
     vehicle = Follower(mission, -6.0, 0.0)
     vehicle.until(lambda: vehicle.nose()[0] > 0.1)
-    along, vehicle.off = vehicle.nose()[0], 0.3
+    along, vehicle.off = vehicle.nose()[0], 0.5
     for _ in range(20):
         vehicle.step()
-    assert mission.cross > HoveringDockingSettings().corridor - 0.05 or mission.along > along + 0.2
-    assert vehicle.nose()[0] - along > 0.1
+    assert vehicle.nose()[0] - along > 0.15
