@@ -136,8 +136,9 @@ def _bound(
     start = (north_0, east_0)
     middle = own.places[0]
     half = 0.5 * span if span else max(400.0, 2.0 * float(np.abs(np.array(start) - middle).max()))
+    end = STEP * min(len(way.inputs) for way in ways.values())
     north, east = (np.linspace(c - half, c + half, side) for c in middle.tolist())
-    prior, times, order, rows, outputs = _sights(scenario, own, about, heard)
+    prior, times, order, rows, outputs = _sights(own, about, heard, end)
     stations = np.stack(np.meshgrid(north, east, indexing="ij"), axis=-1).reshape(-1, 2)
     results = []
     for k in range(0, len(stations), BLOCK):
@@ -154,18 +155,20 @@ def _bound(
         follower=name, moved=moved, start=start, north=north, east=east, times=times[outputs],
         position=np.sqrt(variance[..., :2].sum(axis=-1)), current=np.sqrt(variance[..., 2:4].sum(axis=-1)),
         rank=rank.reshape(shape), condition=condition.reshape(shape), mirror=_nearest(coarse, mirror, (north, east)),
-        after=scenario.duration / 3.0 if after is None else after, blind_above=blind, ways=ways,
+        after=end / 3.0 if after is None else after, blind_above=blind, ways=ways,
     )  # fmt: skip
 
 
-def _sights(scenario: Scenario, own: Way, about: Odometry, heard: Sequence[Source]):
-    """Prior (9, 9), times (k,), source and number of each sight, displacements (k, 6), places among them kept."""
+def _sights(own: Way, about: Odometry, heard: Sequence[Source], end: float):
+    """Prior (9, 9), times (k,) up to `end` [s], source and number of each, displacements (k, 6), those kept."""
     deviations = dict(about.deviations)
     for source in heard:
         for state, deviation in source.errors.items():
             deviations[state] = max(deviations.get(state, 0.0), deviation)
     prior = np.diag(SPACE.vector(deviations) ** 2)
-    every = sorted((t, s, k) for s, source in enumerate(heard) for k, t in enumerate(source.times.tolist()))
+    every = sorted((t, s, k) for s, source in enumerate(heard) for k, t in enumerate(source.times.tolist()) if t <= end)
+    if not every:
+        raise InputError(f"nothing is ranged to in the {end:g} s before the first track ends")
     times = np.array([t for t, _, _ in every])
     order = np.array([(s, k) for _, s, k in every])
     steps = sampled(own.inputs, STEP, about.noise)

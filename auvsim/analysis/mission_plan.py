@@ -68,7 +68,7 @@ class Odometry(NamedTuple):
 
 
 def way(scenario: Scenario, name: str, field: CurrentField) -> Way:
-    """The way of a vehicle on its track, that heads at once where its mission asks and knows where it is.
+    """The way of a vehicle up to the end of its track, that heads at once where that asks and knows where it is.
 
     Raises:
         InputError: It has a mission of another kind.
@@ -92,6 +92,8 @@ def way(scenario: Scenario, name: str, field: CurrentField) -> Way:
             velocity=np.array((speed, 0.0, 0.0)), current=water, covariance=np.zeros((8, 8)), initialised=True,
         )  # fmt: skip
         asked = mission.update(Situation(k * STEP, now, heading, depth, None, (), ()))
+        if mission.finished:
+            break
         heading, depth, speed = asked.heading, asked.depth, asked.speed
         place = place + STEP * (speed * np.array((math.cos(heading), math.sin(heading))) + water)
         places.append(place)

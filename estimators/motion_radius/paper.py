@@ -19,6 +19,7 @@ from estimators.motion_radius.ranges import KIND, flattened
 UNKNOWN = Gaussian(mean=np.array([10.0, -100.0, 0.0, 0.0]), covariance=np.diag([1e8, 1e8, 1e7, 1e7]))
 Q = np.diag([10.0, 10.0, 2.0, 2.0, 0.05, 0.05]) ** 2  # of x, y, dx, dy, Ux, Uy, each cycle
 R = np.diag([10.0] * 6 + [2.0, 2.0, 0.05, 0.05]) ** 2  # slave, leader then, leader now (x, y each), dx, dy, Ux, Uy
+SIMULTANEOUS = "simultaneous"  # why a second range at one time is refused: nothing lies between the two
 STEEP = "too_steep"  # why a range is refused that no range in the plan view explains
 SILENT = OdometryNoise()
 
@@ -89,8 +90,8 @@ class PaperFilter:
             belief, nis = state.corrected, np.nan
             if state.last is not None and state.since.duration > 0.0:
                 belief, nis = corrected(state.corrected, state.since, state.last, packet, self._reading)
-            elif state.last is not None:  # a second leader at the same time: there is no displacement to pair it over
-                state = state._replace(verdicts=(*state.verdicts, (m, "duplicate", np.nan)))
+            elif state.last is not None:
+                state = state._replace(verdicts=(*state.verdicts, (m, SIMULTANEOUS, np.nan)))
                 continue
             state = PaperState(belief, Displacement(), packet, (*state.verdicts, (m, "", nis)))
         return state

@@ -131,7 +131,7 @@ def test_over_lost_packets_the_next_range_is_paired_with_the_last_that_came():
         if second == 48:
             whole = Displacement()
             for u in run.inputs[16:48]:
-                whole = whole.extended(*u, 1.0, OdometryNoise())
+                whole = whole.extended(u[0], u[1], u[2], 1.0, OdometryNoise())
             before, now = (Packet(float(few[k].value[0]), np.array(few[k].parameters[:2])) for k in (16, 48))
             expected, _ = paper.corrected(state.corrected, whole, before, now, "A")
             state = filter_.correct(state, 48.0, [few[48]])
@@ -209,14 +209,15 @@ def test_drift_of_the_offset_and_the_derivative_by_all_states():
 
 
 def test_noise_of_a_displacement_is_that_of_its_samples():
+    noise = NOISE._replace(heading=0.008)  # so that it counts as much as the speed's
     rng = np.random.default_rng(8)
     count, headings = 20000, 0.4 + 0.9 * np.sin(np.arange(8.0))
     whole = Displacement()
     for heading in headings:
-        whole = whole.extended(1.5, 0.2, heading, 1.0, NOISE)
+        whole = whole.extended(1.5, 0.2, heading, 1.0, noise)
     v = 1.5 + math.sqrt(NOISE.forward) * rng.standard_normal((count, 8))
     w = 0.2 + math.sqrt(NOISE.starboard) * rng.standard_normal((count, 8))
-    psi = headings + math.sqrt(NOISE.heading) * rng.standard_normal((count, 8))
+    psi = headings + math.sqrt(noise.heading) * rng.standard_normal((count, 8))
     sums = np.stack(((v * np.cos(psi) - w * np.sin(psi)).sum(1), (v * np.sin(psi) + w * np.cos(psi)).sum(1)), axis=1)
     expected = np.cov(sums.T)
     # The standard deviation of a sample covariance is 1 % of the variances at 20 000 samples.
@@ -373,7 +374,7 @@ def test_smoothing_is_the_most_probable_trajectory():
     for k in range(count):
         value = 90.0 + 6.0 * math.sin(k) + rng.standard_normal()
         nodes[k + 1].measurements.append(leader_range(value, leader[k], deviation=1.5, stamp=dt * (k + 1), depth=0.0))
-    rows = [Displacement().extended(*u, dt, NOISE) for u in inputs]
+    rows = [Displacement().extended(u[0], u[1], u[2], dt, NOISE) for u in inputs]
     roots = [np.linalg.cholesky([[r.north_north, r.north_east], [r.north_east, r.east_east]]) for r in rows]
     free = np.array([name != "range_drift" for name in SPACE.names])
     deviations = SPACE.vector(DEVIATIONS)
