@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import LogNorm
 from matplotlib.patches import Ellipse as EllipsePatch
 from matplotlib.patches import Patch
+from numpy.typing import NDArray
 
 from auvsim.analysis.style import dress
 from auvsim.base.frames import Array
@@ -40,6 +41,13 @@ class Symbol(NamedTuple):
     heading: float | None = None  # clockwise from north [rad]; None: it has none, as a beacon
     colour: str = "#d62728"
     marker: str = "^"  # of those without a heading
+
+
+class Region(NamedTuple):
+    """A part of a map that is marked by dots."""
+
+    label: str
+    inside: NDArray[np.bool_]  # (m, n) on the map's grid
 
 
 class MapEllipse(NamedTuple):
@@ -74,6 +82,7 @@ def draw(
     symbols: Sequence[Symbol] = (),
     ellipses: Sequence[MapEllipse] = (),
     ellipse_scale: float = 1.0,
+    regions: Sequence[Region] = (),
     quantity: str = "least rms position error [m]",
 ) -> None:
     """Draws a map of the bound, east to the right and north up, with a colour bar and a legend.
@@ -87,6 +96,7 @@ def draw(
         symbols: Vehicles and beacons.
         ellipses: Error ellipses.
         ellipse_scale: By which ellipses are enlarged, so that they can be seen; the legend says so.
+        regions: Parts that are marked.
         quantity: What the colour bar shows.
     """
     east, north = np.meshgrid(shown.east, shown.north)
@@ -112,6 +122,11 @@ def draw(
         axes.contourf(east, north, region, levels=(0.5, 1.5), colors=["#dddddd"], hatches=["////"], zorder=1.5)
         what = f"blind: above {blind:.3g} m" if math.isfinite(blind) else "blind: no bound"
         handles.append(Patch(facecolor="#dddddd", edgecolor="#222222", hatch="////", label=what))
+    for region in regions:
+        if np.any(region.inside):
+            inside = np.where(region.inside, 1.0, 0.0)
+            axes.contourf(east, north, inside, levels=(0.5, 1.5), colors="none", hatches=["oo"], zorder=1.6)
+            handles.append(Patch(facecolor="none", edgecolor="#222222", hatch="oo", label=region.label))
     for e in ellipses:
         if math.isfinite(e.ellipse.major):
             axes.add_patch(_patch(e, ellipse_scale))

@@ -5,10 +5,15 @@ import math
 from typing import Any
 
 from auvsim.analysis.estimates import estimate_errors, estimate_quality
+from auvsim.base import plugins
+from auvsim.base.errors import InputError
 from auvsim.data.attributes import WALL_TIME
 from auvsim.data.log import Log, VehicleLog
+from auvsim.missions import contract
 from auvsim.missions.docking.metrics import end_of
 from auvsim.missions.registry import MISSIONS, find
+
+NO_METRICS = "metrics_error"  # key of why a mission of the user's own has no metrics
 
 
 def summarise(log: VehicleLog) -> dict[str, Any]:
@@ -43,11 +48,13 @@ def summarise_all(log: Log) -> dict[str, Any]:
 
 
 def _of_its_own(log: VehicleLog) -> dict[str, Any]:
-    """Metrics of a mission of the user's own; none where its class cannot be found here."""
+    """Metrics of a mission of the user's own; where there are none, why: its class may be missing, or fail."""
     try:
-        return find(log.mission).metrics(log)
-    except (Exception, SystemExit):  # a user's class may be missing, or fail in any way
-        return {}
+        mission: Any = find(log.mission)
+        return contract.metrics(mission.metrics(log))
+    except (Exception, SystemExit) as error:
+        text = plugins.same_each_time(" ".join(str(error).split()))[:300]
+        return {NO_METRICS: text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"}
 
 
 def _plain(value: Any) -> Any:

@@ -32,6 +32,7 @@ def figure(trials: SeaTrials | HoverTrials) -> Figure:
     """The figure that `draw` writes."""
     made = Figure(figsize=SIZE, layout="constrained")
     axes = made.subplots(2, 3)
+    shown: Any = trials
     if isinstance(trials, SeaTrials):
         panels = (_speeds, _turns, _zigzag, _dive, _stops)
         made.suptitle(f"{trials.model}: sea trials in still water, at {trials.cruise:.2f} m/s", fontsize=13)
@@ -39,7 +40,7 @@ def figure(trials: SeaTrials | HoverTrials) -> Figure:
         panels = (_forces, _turning, _stop, _step, _holding)
         made.suptitle(f"{trials.model}: hovering trials", fontsize=13)
     for panel, where in zip(panels, axes.flat, strict=False):
-        panel(where, trials)
+        panel(where, shown)
     _table(axes.flat[5], rows(trials))
     return made
 

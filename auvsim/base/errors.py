@@ -1,5 +1,11 @@
 """Errors of auvsim: one root; a text says what was wrong, where, and what would be right."""
 
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+DOTTED = re.compile(r"([a-z]\w*(?:\.[\w-]+)+): ")  # key before the text of an error
+
 
 class AuvsimError(Exception):
     """Root of all errors that auvsim raises on purpose."""
@@ -21,7 +27,18 @@ class DrawingError(AuvsimError):
     """There is no OpenGL to draw with; everything but video works without."""
 
 
-def unknown_name(kind: str, name: str, known: "list[str]") -> InputError:
+@contextmanager
+def at_key(key: str) -> Iterator[None]:
+    """Puts a dotted key before the text of an InputError, unless one stands there."""
+    try:
+        yield
+    except InputError as error:
+        if DOTTED.match(str(error)):
+            raise
+        raise InputError(f"{key}: {error}") from error
+
+
+def unknown_name(kind: str, name: str, known: list[str]) -> InputError:
     """An error that lists the names that do exist: `no vehicle 'remus'; there are lauv, remus100`."""
     name = name if len(name) <= 100 else f"{name[:97]}..."
     return InputError(f"no {kind} '{name}'; there are {', '.join(sorted(known)) or 'none'}")

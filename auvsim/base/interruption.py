@@ -12,23 +12,24 @@ class HeldInterrupt:
     """While it is entered, Ctrl-C is only remembered; the third press in a step that hangs raises as before.
 
     Compiled code turns KeyboardInterrupt into errors of its own, and one that comes while a log is finished would lose
-    it. Outside the main thread, and where Ctrl-C is ignored already, nothing changes.
+    it. SIGTERM is taken as Ctrl-C where it is handled at all, as by the command line. Outside the main thread, and
+    where Ctrl-C is ignored already, nothing changes.
     """
 
     def __init__(self) -> None:
         self.presses = 0
-        self._before: Any = None
+        self._before: dict[int, Any] = {}
 
     def __enter__(self) -> "HeldInterrupt":
-        before = signal.getsignal(signal.SIGINT)
-        if callable(before) and threading.current_thread() is threading.main_thread():
-            self._before = before
-            signal.signal(signal.SIGINT, self._press)
+        if threading.current_thread() is threading.main_thread():
+            for number in (signal.SIGINT, signal.SIGTERM):
+                if callable(signal.getsignal(number)):
+                    self._before[number] = signal.signal(number, self._press)
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        for number, handler in self._before.items():
+            signal.signal(number, handler)
 
     def check(self) -> None:
         """Raises KeyboardInterrupt if Ctrl-C came.
@@ -42,4 +43,4 @@ class HeldInterrupt:
     def _press(self, number: int, frame: FrameType | None) -> None:
         self.presses += 1
         if self.presses >= PATIENCE:
-            self._before(number, frame)
+            self._before[number](number, frame)

@@ -73,7 +73,7 @@ def suggestion(key: str, model: type[BaseModel], siblings: list[str]) -> str:
         return f"only another kind has it; there are {', '.join(siblings)}"
     near = [".".join([*above, close]) for close in get_close_matches(name, siblings, n=1)]
     if not near:
-        everywhere = list(dict.fromkeys(keys(model)))
+        everywhere = [other for other in dict.fromkeys(keys(model)) if not key.startswith(f"{other}.")]
         near = [other for other in everywhere if other.split(".")[-1] == name] or get_close_matches(
             key, everywhere, n=1
         )
@@ -99,14 +99,16 @@ def explain(error: ValidationError, model: type[BaseModel], values: Mapping, pla
         if not any(place[: len(report["loc"])] == report["loc"] != place for place in found)
     ]
     report = min(reports, key=lambda report: report["type"] != "extra_forbidden")
-    path, owner, field = _locate(report["loc"], model, values)
+    path, owner, field, options = _locate(report["loc"], model, values)
     cause = report.get("ctx", {}).get("error")
     if isinstance(cause, UnknownKeyError):
         path = f"{path}.{cause.key}"
         text = f"unknown key; {suggestion(path, model, cause.siblings)}{cause.more}"
     else:
-        text = _reason(report, path, model, owner, field)
-    path, text = (path, text) if path else text.split(": ", 1) if ": " in text else ("", text)
+        text = _reason(report, path, model, owner, field, options)
+    below, colon, rest = text.partition(": ")
+    if colon and (not path or f"{path}.{below}" in places):  # a validator of the whole says which key below it
+        path, text = f"{path}.{below}" if path else below, rest
     more = f" ({len(reports) - 1} more wrong)" if len(reports) > 1 else ""
     return InputError(": ".join(part for part in (place(path, places), path, text + more) if part))
 
@@ -118,18 +120,25 @@ def commented(model: type[BaseModel], values: Mapping) -> str:
 
 def _locate(
     location: tuple, model: type[BaseModel], values: Any
-) -> tuple[str, type[BaseModel] | None, FieldInfo | None]:
-    """Dotted path of pydantic's location (its union tags left out), the class that owns the last key, its field."""
+) -> tuple[str, type[BaseModel] | None, FieldInfo | None, list[type[BaseModel]]]:
+    """Where pydantic found an error, its union tags left out.
+
+    Returns:
+        Dotted path, the class that owns the last key, its field, and the classes of settings that may stand there.
+    """
     path: list[str] = []
+    tagged = False  # whether the tag of the union at this place has been left out
     owner: type[BaseModel] | None = model
     field: FieldInfo | None = None
     annotation: Any = model
     for part in location:
-        if isinstance(values, Mapping) and part not in values and _is_tag(part, annotation, values):
+        if not tagged and _is_tag(part, annotation, values):
+            tagged = True
             continue
         if part == "[key]":  # the name that the user chose is itself at fault
             continue
         path.append(str(part))
+        tagged = False
         if isinstance(part, int):
             annotation = (get_args(annotation) or (None,))[0]
             values = values[part] if isinstance(values, list | tuple) and part < len(values) else None
@@ -143,16 +152,26 @@ def _locate(
         field = owner.model_fields.get(part) if owner else None
         annotation = field.annotation if field else None
         values = values.get(part) if isinstance(values, Mapping) else None
-    return ".".join(path), owner, field
+    return ".".join(path), owner, field, members(annotation)
 
 
-def _is_tag(part: Any, annotation: Any, values: Mapping) -> bool:
+def _is_tag(part: Any, annotation: Any, values: Any) -> bool:
     """Whether a part of pydantic's location is the tag of a union, not a key."""
-    return part == values.get("kind") or part in {model.__name__ for model in members(annotation)}
+    models = members(annotation)
+    if (isinstance(values, Mapping) and part in values) or get_origin(annotation) is dict:
+        return False
+    return part in {model.__name__ for model in models} or (
+        len(models) > 1 and part in {kind for model in models for kind in kinds(model)}
+    )
 
 
 def _reason(
-    report: Any, path: str, model: type[BaseModel], owner: type[BaseModel] | None, field: FieldInfo | None
+    report: Any,
+    path: str,
+    model: type[BaseModel],
+    owner: type[BaseModel] | None,
+    field: FieldInfo | None,
+    options: list[type[BaseModel]],
 ) -> str:
     kind, message = report["type"], report["msg"]
     about = f" ({field.description})" if field and field.description else ""
@@ -162,14 +181,21 @@ def _reason(
         return f"not given{about}"
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         found = report.get("ctx", {}).get("tag")
-        tags = [kind for option in members(field.annotation) for kind in kinds(option)] if field else []
-        if field and any(issubclass(option, OwnPart) for option in members(field.annotation)):
+        tags = [kind for option in options for kind in kinds(option)]
+        if any(issubclass(option, OwnPart) for option in options):
             tags.append("package.module:Name of your own")
         return f"{f'no kind {found!r}' if found else 'kind is not given'}; there are {', '.join(tags)}"
     if kind == "value_error":
         return message.removeprefix("Value error, ")
+    limits = report.get("ctx", {})
+    if kind == "too_short":
+        return f"give {limits['min_length']} or more, not {limits['actual_length']}{about}"
+    if kind == "too_long":
+        return f"give {limits['max_length']} at most, not {limits['actual_length']}{about}"
     value = yaml_text.dump(report["input"], flow=True)
     value = value if len(value) <= 60 else value[:57] + "..."
+    if kind == "string_pattern_mismatch" and report["loc"][-1] == "[key]":
+        return f"a name is 1 to 64 letters without accents, digits, '_' and '-', and begins with no digit{about}"
     for said, better in (("Input should", "should"), ("String should", "should"), ("be an object", "be a mapping")):
         message = message.replace(said, better, 1)
     return f"{value} {message}{about}"

@@ -8,6 +8,7 @@ from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from typing import Any
 
+THREADED = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 Progress = Callable[[float, float], None]  # called with the weight done and the total weight
 
 
@@ -30,6 +31,8 @@ def run_tasks(tasks: Sequence[Task], jobs: int | None = None, progress: Progress
     """
     tasks = sorted(tasks, key=lambda task: -task.weight)
     total, finished = sum(task.weight for task in tasks), 0.0
+    for library in THREADED:  # a task has one core: threads of linear algebra would only wait for each other
+        os.environ.setdefault(library, "1")
     # Spawned, not forked: MuJoCo, OpenGL, BLAS and numba may hold threads and locks of this process.
     pool = ProcessPoolExecutor(
         max(1, min(jobs or os.cpu_count() or 1, len(tasks))),
@@ -46,6 +49,10 @@ def run_tasks(tasks: Sequence[Task], jobs: int | None = None, progress: Progress
             if progress:
                 progress(finished, total)
         return {task.key: results[task.key] for task in tasks}
+    except KeyboardInterrupt:
+        for process in multiprocessing.active_children():  # which Ctrl-C may not have reached
+            process.terminate()
+        raise
     finally:
         pool.shutdown(cancel_futures=True)
 

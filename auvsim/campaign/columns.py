@@ -9,9 +9,10 @@ from functools import cache
 from typing import Any
 
 from auvsim.analysis.estimates import AT_REST
+from auvsim.analysis.summary import NO_METRICS
 from auvsim.base.errors import InputError
 from auvsim.campaign.criterion import Criterion
-from auvsim.missions import registry
+from auvsim.missions import contract, registry
 from auvsim.missions.mission import Metric
 
 Row = dict[str, Any]  # of the table, by column; None where there is no value
@@ -114,14 +115,15 @@ def metrics_of(kind: str) -> Mapping[str, Metric]:
     Raises:
         InputError: there is no such mission.
     """
-    declared: Mapping[str, Metric] = getattr(registry.find(kind), "columns", {})
-    return {_renamed(name): Metric(*column) for name, column in declared.items()}
+    return {_renamed(name): column for name, column in contract.columns(kind, registry.find(kind)).items()}
 
 
 @cache
 def phases_of(kind: str) -> tuple[str, ...]:
     """Phases of a kind of mission in which its vehicle is under way; none of a mission that has only one."""
-    phases: tuple[str, ...] = getattr(registry.find(kind), "phases", ())
+    phases = getattr(registry.find(kind), "phases", ())
+    if not isinstance(phases, tuple | list) or not all(isinstance(phase, str) for phase in phases):
+        raise InputError(f"mission '{kind}': phases is {phases!r}, not a tuple of names")
     return tuple(phase for phase in phases if phase != AT_REST) if len(phases) > 1 else ()
 
 
@@ -170,8 +172,9 @@ def check(kind: str, summary: Mapping[str, Any]) -> None:
     Raises:
         InputError: One line with the metric that is missing or of another type.
     """
-    for name, column in getattr(registry.find(kind), "columns", {}).items():
-        dtype = Metric(*column).dtype
+    if NO_METRICS in summary:
+        raise InputError(f"mission '{kind}': its metrics cannot be had: {summary[NO_METRICS]}")
+    for name, (dtype, *_) in contract.columns(kind, registry.find(kind)).items():
         if name not in summary:
             raise InputError(f"mission '{kind}': its metrics lack '{name}', which it declares")
         fits = (int, float) if dtype == "float" else TYPES[dtype]

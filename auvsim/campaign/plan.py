@@ -17,7 +17,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.settings import Settings
 from auvsim.campaign import columns, design
 from auvsim.campaign.criterion import Criterion
-from auvsim.simulation import controllers, sampling, scenario, short
+from auvsim.simulation import controllers, loading, sampling, scenario, short
 from auvsim.vehicles import library
 
 SHIPPED = Path(auvsim.__file__).parent / "plans"
@@ -234,6 +234,8 @@ def _check_names(settings: PlanSettings, places: Mapping[str, str]) -> None:
     for name in settings.variants:
         if not re.fullmatch(r"[\w+-][\w.+-]*", name, re.ASCII):
             raise _wrong(f"variants.{name}", "a name is made of letters, digits and . _ + -, without spaces", places)
+        for key, text in loading.unknown_names(settings.base, settings.variants[name]):
+            raise _wrong(f"variants.{name}.{key}", text, places)
     if not settings.variants:
         raise _wrong("variants", "none; leave the key out for a campaign of the base scenario alone", places)
     for key, options in settings.grid.items():
@@ -241,6 +243,8 @@ def _check_names(settings: PlanSettings, places: Mapping[str, str]) -> None:
             raise _wrong(f"grid.{key}", "no values; give some, or leave the key out", places)
         if any(other != key and _overlap(key, other) for other in settings.grid):
             raise _wrong(f"grid.{key}", "another key of the grid is above or below it", places)
+        for wrong, text in loading.unknown_names(settings.base, _nested({key: options[0]})):
+            raise _wrong(f"grid.{wrong}", text, {**places, f"grid.{wrong}": schema.place(f"grid.{key}", places)})
         for name, pins in settings.variants.items():
             below = [*sampling.varied(pins, chosen=True)]
             if any(_overlap(key, other) for other in below):

@@ -16,7 +16,7 @@ from auvsim import CACHE_NOTE, RENDERER_NOTE, __version__
 from auvsim.base.errors import AuvsimError, DrawingError, InputError
 from auvsim.base.neighbours import check_estimators
 from auvsim.cli.interruption import Interruption
-from auvsim.cli.parsing import parse
+from auvsim.cli.parsing import files_first, parse
 
 # What draws and computes is imported when a command needs it, so that `--help` answers at once.
 
@@ -30,8 +30,8 @@ class Dock:
     the trial ran, docked or not; 1 the simulation diverged; 2 bad input; 130 interrupted.
     """
 
-    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """Keys that are not drawn from the seed, as YAML."""
+    scenario: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml|NAME]")] = None
+    """Keys that are not drawn from the seed, as YAML, or the name of a shipped scenario."""
     seed: int = 0
     """Seed of every random number."""
     trial: int = 0
@@ -62,6 +62,33 @@ class Run:
     """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several."""
     video: bool = True
     """Whether to draw run.mp4."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Bound:
+    """Maps how well followers can know position and current at best, over where a leader, beacon or dock starts.
+
+    The Cramer-Rao bound of the planned tracks, with the scenario's noises, losses and delays, before anything is run:
+    bound_FOLLOWER.png and bound_FOLLOWER.nc of each follower. Blind and mirror regions are marked. Any key of the
+    scenario is an option too, as of `auvsim run`.
+    """
+
+    scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
+    """The scenario, or the name of a shipped one (leader_follower)."""
+    out: Path = Path("out")
+    """Folder of the maps."""
+    move: Annotated[str | None, tyro.conf.arg(metavar="NAME")] = None
+    """Vehicle, range sensor (its beacon) or structure that starts elsewhere; by default what is heard first."""
+    span: float | None = None
+    """Width of the square of stations about the follower's start [m]; by default wide enough for the planned one."""
+    side: int = 51
+    """Stations along each side of the square."""
+    after: float | None = None
+    """Time from which the position counts [s]; by default a third of the duration."""
+    blind: float = 50.0
+    """Bound of the position from which a station counts as blind [m]."""
+    seed: int = 0
+    """Seed of the current, where that is random."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,8 +146,8 @@ class Metrics:
 class ScenarioText:
     """Prints the full scenario as commented YAML: the default one, or what a file and options make of it."""
 
-    scenario: Annotated[Path | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml]")] = None
-    """Keys that are not drawn from the seed, as YAML."""
+    scenario: Annotated[str | None, tyro.conf.Positional, tyro.conf.arg(metavar="[SCENARIO.yaml|NAME]")] = None
+    """Keys that are not drawn from the seed, as YAML, or the name of a shipped scenario."""
     default: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """The default scenario as installed."""
 
@@ -129,15 +156,16 @@ class ScenarioText:
 class Reproduce:
     """Reproduces the figures and tables of a paper.
 
-    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv, table1.csv, figure6.png,
-    figure7.png and study.png; of MuJoCo's truth study_mujoco.csv, of both truths.csv and truths.png (paper1); each of
-    the paper's tables as CSV and figures as PNG, and claims.csv (paper4). The same seed gives the same numbers, on
-    however many cores.
+    Prints the study with its acceptance criteria, and writes study.csv, acceptance.csv and the paper's figures as PNG,
+    figures and tables of its own beside them. The same seed gives the same numbers, on however many cores.
     """
 
-    paper: Annotated[Literal["paper1", "paper4"], tyro.conf.Positional]
-    """paper1: navigation to a dock by USBL (Qiu and Li 2019). paper4: formations of leaders and a follower
-    (Li et al. 2023)."""
+    paper: Annotated[Literal["paper1", "paper2", "paper3", "paper4", "paper5"], tyro.conf.Positional]
+    """paper1: navigation to a dock by USBL (Qiu and Li 2019).
+    paper2: ranges to a leader in an unknown current.
+    paper3: cooperative localisation with late packets (Yao et al. 2011).
+    paper4: where leaders are to stand, by ranges (Li et al. 2023).
+    paper5: a path from sonar frames of the sea floor (2009)."""
     quick: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
     """Few runs: under a minute on two cores, with wide intervals."""
     seed: int = 0
@@ -222,7 +250,8 @@ class Identify:
     motion: bool = False
     """Also choose a motion model of a known vehicle, which then takes longer; for an unknown one it always does."""
     steps: tuple[str, ...] = ()
-    """Of a known vehicle's planar model: some of least-squares, segments, prediction-error; by default all."""
+    """Of a known vehicle's planar model: segments, prediction-error or both, also with least-squares, which they
+    start from; by default all."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -297,9 +326,9 @@ class Study:
 class ShowVehicle:
     """Shows what a vehicle does, as one holds it against a data sheet; or makes a vehicle of a data sheet.
 
-    Of a vehicle with fins: speed against shaft speed, trim, turning circles, zig-zag, dive, stopping, and the error of the planar
-    model that filters assume. Of one that thrusters drive: speed against force in each axis, stopping, a step of its place,
-    holding in a current. With --from: NAME.xml, README.md, in which every estimate is marked, and
+    Of a vehicle with fins: speed against shaft speed, trim, turning circles, zig-zag, dive, stopping, and the error of
+    the planar model that filters assume. Of one that thrusters drive: speed against force in each axis, stopping, a
+    step of its place, holding in a current. With --from: NAME.xml, README.md, in which every estimate is marked, and
     controller.yaml.
     """
 
@@ -314,6 +343,7 @@ class ShowVehicle:
 Command = (
     Dock
     | Run
+    | Bound
     | Campaign
     | Report
     | Manoeuvre
@@ -328,7 +358,23 @@ Command = (
     | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
-TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Auvsim:
+    """The whole command line."""
+
+    command: tyro.conf.OmitSubcommandPrefixes[tyro.conf.OmitArgPrefixes[Command]]
+    version: Annotated[bool, tyro.conf.FlagCreatePairsOff] = False
+    """Prints the version."""
+
+
+TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "bound": Bound, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_NAMES = {
+    "identify": ("--steps",),
+    "estimate": ("--estimator", "--sensors"),
+    "video": ("--camera",),
+}  # several each
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -404,23 +450,29 @@ def _run(arguments: list[str]) -> int:
         from auvsim.cli import options
 
         arguments, values = options.split(arguments, TAKE_SCENARIO_KEYS[arguments[0]])
-    command: Command = parse(Command, arguments, "auvsim", _DESCRIPTION)
+    arguments = files_first(arguments, TAKE_NAMES.get(arguments[0], ()) if arguments else ())
+    command: Command = parse(Auvsim, arguments, "auvsim", _DESCRIPTION).command
     if isinstance(command, ScenarioText):
         from auvsim.cli import options
+        from auvsim.simulation.loading import find
 
-        print(options.scenario_text(command.scenario, command.default, values), end="")
+        path = find(command.scenario) if command.scenario is not None else None
+        print(options.scenario_text(path, command.default, values), end="")
         return 0
 
     if isinstance(command, Dock):
         from auvsim.cli import options, run
+        from auvsim.simulation.loading import find
 
-        scenario = options.scenario(command.scenario, command.estimator, values, command.seed, command.trial)
+        path = find(command.scenario) if command.scenario is not None else None
+        scenario = options.scenario(path, command.estimator, values, command.seed, command.trial)
         _, vehicle = scenario.lone
         if vehicle.mission.kind != "docking":
             manoeuvre = getattr(vehicle.mission, "manoeuvre", None)
             meant = f"auvsim manoeuvre {manoeuvre.kind}" if manoeuvre else "auvsim run"
             raise InputError(f"the scenario is a {vehicle.mission.kind}, not a docking; run it with `{meant}`")
-        return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
+        with options.located(path, values, command.estimator):
+            return run.run(scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video)
 
     if isinstance(command, Run):
         from auvsim.cli import options, run
@@ -428,9 +480,19 @@ def _run(arguments: list[str]) -> int:
 
         path = find(command.scenario)
         scenario = options.scenario(path, None, values, command.seed, command.trial)
-        return run.run(
-            scenario, seed=command.seed, trial=command.trial, out=command.out, video=command.video, name=path.stem
-        )
+        made = {"seed": command.seed, "trial": command.trial, "out": command.out, "video": command.video}
+        with options.located(path, values):
+            return run.run(scenario, **made, name=path.stem)
+
+    if isinstance(command, Bound):
+        from auvsim.cli import bound, options
+        from auvsim.simulation.loading import find
+
+        scenario = options.scenario(find(command.scenario), None, values, command.seed, 0)
+        return bound.run(
+            scenario, out=command.out, move=command.move, span=command.span, side=command.side, after=command.after,
+            blind=command.blind, seed=command.seed,
+        )  # fmt: skip
 
     if isinstance(command, Campaign | Report):
         from auvsim.cli import campaign
@@ -447,10 +509,11 @@ def _run(arguments: list[str]) -> int:
         return campaign.replay(command.plan, **which, out=command.out, video=command.video)
 
     if isinstance(command, Manoeuvre):
-        from auvsim.cli import manoeuvre
+        from auvsim.cli import manoeuvre, options
 
         plans = manoeuvre.plans(command.kinds, values, command.seed, command.trial)
-        return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
+        with options.located(manoeuvre.file_of(command.kinds), values):
+            return manoeuvre.run(plans, seed=command.seed, trial=command.trial, out=command.out)
 
     if isinstance(command, Identify):
         from auvsim.cli import identify
@@ -523,4 +586,4 @@ def _run(arguments: list[str]) -> int:
             return products.again(command.log, products.show_summary)
 
 
-_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles. `auvsim --version` prints the version."
+_DESCRIPTION = "Closed-loop simulation of autonomous underwater vehicles."

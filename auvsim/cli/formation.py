@@ -15,7 +15,6 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.cli.run import output_folder
 from auvsim.reproduce.products import write_files
-from estimators.formation.placement import Reach
 
 MOST = 50  # leaders
 WIDTH = 110  # of the table [columns]
@@ -77,7 +76,7 @@ def formation(
         raise InputError(f"command line: --heading-deg {heading_deg:g} must be a finite number")
     if apart >= modem:
         raise InputError(f"command line: --apart {apart:g} must be less than --modem {modem:g}")
-    limits_of_moves = Reach(distance=reach, modem=modem, apart=apart)
+    limits_of_moves = formation_map.Reach(distance=reach, modem=modem, apart=apart)
     return Formation(
         leaders=np.array(places), follower=own, deviations=np.resize(np.array(deviations), len(places)),
         speed=speed, heading=math.radians(heading_deg), step=step, reach=limits_of_moves,

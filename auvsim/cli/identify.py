@@ -20,9 +20,10 @@ from auvsim.identification.motion import report as motion_page
 from auvsim.identification.motion.dimensions import Dimensions
 from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
 from auvsim.identification.pipeline import STEPS, Identification, identify
-from auvsim.identification.readers import models, read
+from auvsim.identification.readers import models, read, texts
 from auvsim.identification.records import Readings
 from auvsim.physics import planar_sets
+from auvsim.vehicles import library
 
 PARAMETERS = "parameters.yaml"
 MANY = 8  # notes that are printed; the report has all
@@ -51,11 +52,27 @@ def run(
     """
     if not logs:
         raise InputError("command line: no log; give trial logs, or CSV or NetCDF files with named columns")
+    with library.given(texts([*logs, *holdout])):
+        return _run(logs, out, holdout, columns, vehicle, name, steps, quick, _hull(hull), motion)
+
+
+def _run(
+    logs: Sequence[Path],
+    out: Path,
+    holdout: Sequence[Path],
+    columns: Path | None,
+    vehicle: str | None,
+    name: str | None,
+    steps: Sequence[str],
+    quick: bool,
+    known: Dimensions | None,
+    motion: bool,
+) -> int:
+    """As `run`, with the vehicle as the logs hold it."""
     vehicle = vehicle or _vehicle([*logs, *holdout])
     if vehicle is None and (name is not None or steps):
         flag = "--name" if name is not None else "--steps"
         raise InputError(f"command line: {flag} is of a known vehicle's planar model; give --vehicle too")
-    known = _hull(hull)
     target = None if name is None or vehicle is None else _target(name, vehicle)
     chosen = _steps(steps)
     readings = read(logs, vehicle=vehicle, columns=columns)
@@ -142,6 +159,11 @@ def _target(name: str, vehicle: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9][\w-]*", name) or name == planar_sets.CONDENSE:
         raise InputError(f"command line: --name '{name}': give a plain name such as 'lake', not a path or 'condense'")
     folder = planar_sets.folder(vehicle)
+    if folder.is_relative_to(library.PACKAGE):
+        raise InputError(
+            f"command line: --name keeps parameters in {folder}, within the installed package, where they would go "
+            "with it; leave --name out, and give --estimator.model the parameters.yaml of --out"
+        )
     if not folder.parent.is_dir():
         raise InputError(f"command line: --name: no folder {folder.parent} of '{vehicle}'")
     return folder / f"{name}{planar_sets.SUFFIX}"

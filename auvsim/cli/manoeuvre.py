@@ -43,6 +43,11 @@ def plans(arguments: Sequence[str], values: Mapping, seed: int, trial: int) -> d
     return {kind: _plan(kind, files[0] if files else None, values, seed, trial) for kind in kinds}
 
 
+def file_of(arguments: Sequence[str]) -> Path | None:
+    """The YAML file among the arguments, if there is one."""
+    return next((Path(name) for name in arguments if name.endswith((".yaml", ".yml"))), None)
+
+
 def _plan(kind: str, file: Path | None, values: Mapping, seed: int, trial: int) -> Scenario:
     given = values.get("manoeuvre")
     given = given if isinstance(given, Mapping) else {}

@@ -1,13 +1,14 @@
 """The scenario of a command line: the default plan, a YAML file on top, keys given as options on top of that."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, get_type_hints
 
 from auvsim.base import schema, yaml_text
-from auvsim.base.errors import InputError
-from auvsim.simulation import loading, sampling
+from auvsim.base.errors import DOTTED, InputError
+from auvsim.simulation import loading, sampling, short
 from auvsim.simulation.scenario import Scenario, Start, parse
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.simulation.short import ShortScenario
@@ -61,6 +62,29 @@ def scenario(
     return parse(sampling.draw(plan, seed, trial, places), places)
 
 
+@contextmanager
+def located(path: Path | None, values: Mapping, estimator: str | None = None) -> Iterator[None]:
+    """Says of an InputError that begins with a dotted key where that key was given.
+
+    Args:
+        path: file of the scenario.
+        values: keys given as options.
+        estimator: kind that an option of its own gives.
+    """
+    try:
+        yield
+    except InputError as error:
+        found = DOTTED.match(str(error))
+        if found is None or found.group(1).split(".")[0] not in Scenario.model_fields:
+            raise
+        plan, places = _plan(path, values, estimator)
+        key = found.group(1)
+        if "vehicles" not in plan:
+            key = short.short_key(key, plan.get("mission") is None)
+        where = schema.place(key, places)
+        raise InputError(": ".join(part for part in (where, key, str(error)[found.end() :]) if part)) from error
+
+
 def scenario_text(path: Path | None, default: bool, values: Mapping) -> str:
     """The plan that a file and options make of the default one, checked, as commented YAML.
 
@@ -79,7 +103,7 @@ def _plan(
 ) -> tuple[dict, dict[str, str]]:
     if estimator is not None:
         values = sampling.merge({"estimator": {"kind": estimator}}, values)
-    plan, places = loading.plan_of(path, values, base)
+    plan, places = loading.plan_of(path, values, base, PLACE)
     if "vehicles" in plan and "estimator" in values:
         raise InputError(f"{PLACE}: the scenario names its vehicles; give --vehicles.NAME.estimator.kind")
     return plan, {**places, **dict.fromkeys(_paths(values), PLACE)}
@@ -97,7 +121,7 @@ def _check(key: str, name: str, own: list[str]) -> None:
 
 
 def _is_key(key: str, known: list[str]) -> bool:
-    """Whether a dotted key is known, or below a known one that holds a value.
+    """Whether a dotted key is known, or above a known one, or below one that holds a value.
 
     Below a value may stand a distribution or what a mapping of free form holds: `parse` judges those, and so it does
     with sensors under names of the user's own.
@@ -106,9 +130,7 @@ def _is_key(key: str, known: list[str]) -> bool:
     for other in known:
         pattern = other.split(".")
         is_leaf = not any(below.startswith(f"{other}.") for below in known)
-        if (len(parts) == len(pattern) or (is_leaf and len(parts) > len(pattern))) and all(
-            b in ("*", a) for a, b in zip(parts, pattern, strict=False)
-        ):
+        if (len(parts) <= len(pattern) or is_leaf) and all(b in ("*", a) for a, b in zip(parts, pattern, strict=False)):
             return True
     return "sensors" in parts and len(parts) >= parts.index("sensors") + 3 and _names_a_sensor(parts)
 
@@ -125,7 +147,7 @@ def _put(values: dict, key: str, value: Any) -> None:
         if not isinstance(values, dict):
             raise InputError(f"{PLACE}: --{key} contradicts the value given to a key above it")
     if isinstance(value, dict) and isinstance(values.get(last), dict):
-        value = sampling.merge(values[last], value)
+        value = sampling.merge(values[last], value, last)
     values[last] = value
 
 

@@ -4,11 +4,14 @@ import contextlib
 import io
 from collections.abc import Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import tyro
 
 from auvsim.base.errors import InputError
+
+FILES = {".nc", ".csv", ".txt", ".tsv", ".dat", ".xml", ".yaml", ".yml", ".mcap", ".bag", ".db3", ".parquet"}
 
 
 def parse(kind: Any, arguments: Sequence[str], prog: str, description: str) -> Any:
@@ -31,6 +34,26 @@ def parse(kind: Any, arguments: Sequence[str], prog: str, description: str) -> A
         if not leave.code:
             raise
         raise InputError(f"{_message(complaint.getvalue())}; see {prog} --help") from None
+
+
+def files_first(arguments: Sequence[str], options: Sequence[str]) -> list[str]:
+    """Arguments with the files among the values of options that take several names, which are no names, before them.
+
+    `identify --steps segments turn.nc` is `identify turn.nc --steps segments`.
+
+    Args:
+        arguments: the command, then its arguments.
+        options: that take several names, such as `--steps`.
+    """
+    files: list[str] = []
+    rest: list[str] = []
+    within = False
+    for token in arguments:
+        if token.startswith("-"):
+            within = token.split("=", 1)[0] in options
+        is_file = within and ":" not in token and Path(token).suffix.lower() in FILES
+        (files if is_file else rest).append(token)
+    return [*rest[:1], *files, *rest[1:]]
 
 
 def _message(box: str) -> str:

@@ -11,8 +11,10 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
 
+from auvsim.analysis.summary import NO_METRICS
 from auvsim.base import plugins
 from auvsim.base.errors import InputError
+from auvsim.missions import contract
 from auvsim.missions.manoeuvres.metrics import LABELS, Figures
 from auvsim.missions.registry import find
 
@@ -184,6 +186,8 @@ def show(summary: Mapping[str, Any]) -> None:
     rows = {key: label for kind in sorted(missions) for key, label in _of_its_own(kind).items()} | ROWS
     title = f"{missions.pop().rpartition(':')[2]} trial" if len(missions) == 1 else "run"
     table = Table("", *vehicles, title=title, show_header=bool(several))
+    if any(NO_METRICS in values for values in vehicles.values()):
+        rows[NO_METRICS] = "no metrics of the mission"
     for key, label in rows.items():
         if any(values.get(key) is not None for values in vehicles.values()):
             table.add_row(label, *(_text(values.get(key)) for values in vehicles.values()))
@@ -200,8 +204,8 @@ def _of_its_own(kind: str) -> dict[str, str]:
     if not plugins.is_own(kind):
         return {}
     try:
-        columns = find(kind).columns  # pyright: ignore[reportFunctionMemberAccess]
-    except (InputError, AttributeError):  # its class is not here any more, or declares none
+        columns = contract.columns(kind, find(kind))
+    except InputError:  # its class is not here any more, or declares nothing that can be used
         return {}
     return {key: f"{m.meaning} [{m.units}]" if m.units not in ("", "1") else m.meaning for key, m in columns.items()}
 

@@ -45,6 +45,7 @@ def show_studies() -> None:
     for name, text in studies.STUDIES.items():
         table.add_row(name, text)
     console = Console(width=None if Console().is_terminal else WIDTH)
+    console.print("usage: auvsim study [NAME] [options]\n", highlight=False, markup=False)
     console.print(table)
     console.print("The options of each: auvsim study NAME --help", highlight=False)
 

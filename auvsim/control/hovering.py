@@ -77,8 +77,8 @@ class Hovering:
 class HoveringController:
     """Turns a place, or a speed ahead, with heading and depth into a force and a moment; see `Controller`.
 
-    Place and heading are the estimate's, moved on to now; depth is the gauge's, smoothed, with a DVL's vertical velocity
-    and roll and pitch are the compass' with a gyro's rates, where these are on board. Without a place to be at, the
+    Place and heading are the estimate's, moved on to now; depth is the gauge's, smoothed; a DVL's vertical velocity
+    and a gyro's rates, where these are on board, go with depth and the compass' angles. Without a place to be at, the
     thrust of a speed is held in the open loop.
     """
 

@@ -20,6 +20,8 @@ from auvsim.data.variables import DTYPES, READING, ROOT_TABLES, SIZES, VEHICLE_T
 if TYPE_CHECKING:
     from auvsim.data.log import Log
 
+LARGEST_TRUTH = 1e10  # of any number of the truth: at less than 1000 m/s for less than 10^6 s [SI]
+
 
 def check(log: "Log", where: str) -> None:
     """Refuses a log that is not one of format 3.
@@ -45,6 +47,8 @@ def check(log: "Log", where: str) -> None:
         if path.startswith("vehicles/") and path.split("/")[1] not in log.vehicles:
             raise InputError(f"{where}: the group '{path}' is of no vehicle; there are {', '.join(log.vehicles)}")
         _check_group(log.groups[path], log.tables.get(path, {}), where, path)
+        if path.endswith("/truth"):
+            _check_truth(log.groups[path], where, path)
     for name in {*log.groups["event"]["vehicle"].tolist()} - {"", *log.vehicles}:
         known = ", ".join(log.vehicles)
         raise InputError(f"{where}: 'event/vehicle' has '{name}'; there are {known}, and '' for the run as a whole")
@@ -110,6 +114,14 @@ def _check_group(columns: Mapping[str, NDArray[Any]], table: Table, where: str, 
     if not np.isfinite(columns["time"]).all():
         row = int(np.argmin(np.isfinite(columns["time"])))
         raise InputError(f"{where}: '{path}/time' is {columns['time'][row]} in row {row}; times are finite")
+
+
+def _check_truth(columns: Mapping[str, NDArray[Any]], where: str, path: str) -> None:
+    """Refuses a truth of sizes that no run has; one that diverged may end in values that are not finite."""
+    for name, values in columns.items():
+        most = float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
+        if most > LARGEST_TRUTH:
+            raise InputError(f"{where}: '{path}/{name}' has {most:g} in size; a run has {LARGEST_TRUTH:g} at most")
 
 
 def _check_array(values: NDArray[Any], variable: Variable, sizes: dict[str, int], where: str, name: str) -> None:

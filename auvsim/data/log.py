@@ -37,6 +37,16 @@ class Log:
         """Names of the structures."""
         return self._instances("structures")
 
+    @property
+    def models(self) -> dict[tuple[str, str], str]:
+        """MJCF texts of its models as they were when the run began, by kind (`vehicle`, `structure`) and name."""
+        held = self.groups.get("models", {})
+        if not {"kind", "model", "text"} <= held.keys():
+            return {}
+        return dict(
+            zip(zip(held["kind"].tolist(), held["model"].tolist(), strict=True), held["text"].tolist(), strict=True)
+        )
+
     def vehicle(self, name: str | None = None) -> "VehicleLog":
         """The part of one vehicle; None is the only one.
 

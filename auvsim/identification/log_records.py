@@ -26,11 +26,12 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
     """
     log = read(path).vehicle()
     name = path.name
-    plan = scenario.from_yaml(str(log.log.attributes["scenario"]), f"{path}: scenario").vehicles[log.name]
+    with library.given(log.log.models):
+        plan = scenario.from_yaml(str(log.log.attributes["scenario"]), f"{path}: scenario").vehicles[log.name]
+        vehicle = library.vehicle(plan.model)
     for group, what in (("feedback", "fins and shaft"), ("compass", "heading")):
         if group not in log or len(log[group]["time"]) < 2:
             raise InputError(f"{path}: no readings of {group}; a fit needs {what}, log a trial of some minutes")
-    vehicle = library.vehicle(plan.model)
     feedback = log["feedback"]
     times = feedback["time"]
     found = {

@@ -156,7 +156,7 @@ def _check_steps(steps: Sequence[str]) -> None:
         if step not in STEPS:
             raise unknown_name("step", step, list(STEPS))
     if not {"segments", "prediction error"} & set(steps):
-        raise InputError("steps: least squares are but a start; name segments or prediction error too")
+        raise InputError("steps: least-squares is but a start; give segments or prediction-error too")
 
 
 def _speed(records: Sequence[Record], vehicle: str) -> float:

@@ -7,6 +7,7 @@ from pathlib import Path
 import h5py
 
 from auvsim.base.errors import InputError
+from auvsim.data import log
 from auvsim.identification import checks, log_records, signals, table_records
 from auvsim.identification.columns import ColumnSettings, read_map
 from auvsim.identification.records import Readings
@@ -59,6 +60,20 @@ def _signals(
 def models(paths: Sequence[Path]) -> set[str]:
     """Vehicles of those of the files that are trial logs."""
     return {log_records.signals(path)[2] for path in paths if is_trial_log(path)}
+
+
+def texts(paths: Sequence[Path]) -> dict[tuple[str, str], str]:
+    """MJCF texts that those of the files hold that are trial logs, as `library.given` takes them.
+
+    Raises:
+        InputError: Two logs hold different texts of one vehicle.
+    """
+    found: dict[tuple[str, str], str] = {}
+    for path in filter(is_trial_log, paths):
+        for (kind, model), text in log.read(path).models.items():
+            if kind == "vehicle" and found.setdefault((kind, model), text) != text:
+                raise InputError(f"{path}: '{model}' is not as in the other logs, its file has changed in between")
+    return found
 
 
 def is_trial_log(path: Path) -> bool:

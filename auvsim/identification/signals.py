@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from auvsim.base.errors import InputError
 from auvsim.identification.reckoning import outliers
 from auvsim.identification.records import MEASURED, Record
 from estimators.core.types import Array
@@ -14,6 +15,7 @@ from estimators.core.types import Array
 INPUTS = ("rudder", "shaft_speed")
 WIND = ("wind_forward", "wind_starboard")
 SHORTEST = 10.0  # spans shorter than this hold less than the vehicle's own time constants [s]
+MOST_STEPS = 1e7  # of a record; a hundred times those of a day at 1 Hz
 GAP = 1.0  # missing inputs this long split a record; more slowly sampled ones at three of their intervals [s]
 STEPS = (0.05, 0.5)  # shortest and longest of a grid: a vehicle's yaw takes about a second [s]
 STEEP = math.radians(8.0)  # beyond this pitch a planar model does not hold
@@ -146,6 +148,11 @@ def _spans(signals: Signals) -> Iterator[tuple[float, float]]:
 
 
 def _gridded(signals: Signals, start: float, stop: float, step: float, name: str) -> Record:
+    if (stop - start) / step > MOST_STEPS:
+        raise InputError(
+            f"{name}: lasts {stop - start:g} s without a gap, more than {MOST_STEPS:g} steps of {step:g} s; is a time "
+            "stamp wrong?"
+        )
     times = start + step * np.arange(math.floor((stop - start) / step + 1e-6) + 1, dtype=np.float64)
     given = signals.signals
     inputs = np.column_stack([_means(given[quantity], times, step) for quantity in INPUTS])

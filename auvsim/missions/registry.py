@@ -9,6 +9,7 @@ from pydantic import Discriminator, Tag
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
 from auvsim.base.settings import OwnPart, tag_by_kind
+from auvsim.missions import contract
 from auvsim.missions.docking.guidance import Docking, DockingSettings
 from auvsim.missions.formation.mission import Formation
 from auvsim.missions.formation.settings import FormationSettings
@@ -79,4 +80,6 @@ def build(kind: str, setup: MissionSetup) -> Mission:
     except (Exception, SystemExit) as error:  # a user's class may fail in any way
         raise InputError(f"mission '{kind}' cannot be made: {type(error).__name__}: {error}") from error
     plugins.require(f"mission '{kind}'", part, "phases", "phase", "variables", "finished", "events", "update", "row")
+    if plugins.is_own(kind):
+        contract.check(kind, part)
     return part

@@ -163,8 +163,8 @@ def navigator(
         )
     if not isinstance(actuation, FinsAndShaft):
         raise InputError(
-            f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft, and the vehicle is driven by "
-            "thrusters; take dead_reckoning"
+            f"estimator '{s.kind}' of '{setup.vehicle}': its model is of fins and one shaft, and the vehicle is driven "
+            "by thrusters; take dead_reckoning"
         )
     readings = max(1.0, setup.rates.get("compass", 0.0) * setup.period)
     biases = {**aids.biases(used, setup.sensors.get("compass")), **base.biases}

@@ -55,7 +55,7 @@ class Estimate:
         return self.covariance[:2, :2]
 
     def at(self, time: float) -> tuple[Array, Array, float]:
-        """By dead reckoning, at a time [s]: north, east (2,) [m]; velocity over ground, body (2,) [m/s]; heading [rad]."""
+        """By dead reckoning at a time [s]: north, east [m]; surge, sway over ground (2,) [m/s]; heading [rad]."""
         dt, turn = time - self.time, float(self.velocity[2])
         heading = self.heading + turn * dt
         cos, sin = math.cos(heading), math.sin(heading)

@@ -32,7 +32,8 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, range_ekf, paper, current_only, delay_only, "
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, range_ekf, motion_radius, "
+        "path_prediction, paper, current_only, delay_only, "
         "regular_ekf, module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
@@ -98,6 +99,41 @@ class FollowerSettings(_Assumed):
     range_noise: float = Field(default=0.5, gt=0, description="error of a range besides arrival times and packet [m]")
 
 
+class MotionRadiusSettings(_Assumed):
+    """The bank of filters of a follower in an unknown current (paper 2); errors with sd 0 are taken for none."""
+
+    kind: Literal["motion_radius"] = "motion_radius"
+    north: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    east: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    position: float = Field(default=3.0, gt=0, description="error of the assumed start along each axis, sd [m]")
+    current: float = Field(default=1.0, gt=0, description="unknown current along each axis, sd [m/s]")
+    current_noise: float = Field(default=1e-8, ge=0, description="random walk of the current [m2/s3]")
+    position_noise: float = Field(default=1e-3, ge=0, description="process noise of position besides odometry [m2/s]")
+    range_noise: float = Field(default=0.5, gt=0, description="error of a range besides arrival times and packet [m]")
+    clock_offset: float = Field(default=0.0, ge=0, description="difference of the two clocks, sd [s]")
+    clock_drift_ppm: float = Field(default=0.0, ge=0, description="difference of the two clocks' drifts, sd [ppm]")
+    sound_speed_error: float = Field(default=0.0, ge=0, description="error of the assumed sound speed, sd [-]")
+
+
+class PathPredictionSettings(_Assumed):
+    """The filter of a follower that hears pulses and late packets (paper 3): bottom track, gyro, no current."""
+
+    kind: Literal["path_prediction"] = "path_prediction"
+    north: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    east: float | None = Field(default=None, description="assumed start; none: the planned one [m]")
+    position: float = Field(default=3.0, gt=0, description="error of the assumed start along each axis, sd [m]")
+    heading: float = Field(default=0.5, gt=0, description="error of the first heading besides the compass' bias [deg]")
+    period: float = Field(default=8.0, gt=0, description="period of the leader's pulses [s]")
+    delay: float = Field(default=15.0, ge=0, description="longest time from a pulse to its packet [s]")
+    position_noise: float = Field(
+        default=1e-3, ge=0, description="process noise along the way besides the DVL's [m2/s]"
+    )
+    heading_noise: float = Field(default=1e-7, ge=0, description="process noise of heading besides the gyro's [rad2/s]")
+    range_noise: float = Field(default=0.5, gt=0, description="error of a range besides arrival times [m]")
+    leader_speed_noise: float = Field(default=1e-3, ge=0, description="noise of the leader's way [m2/s]")
+    leader_yaw_noise: float = Field(default=1e-6, ge=0, description="noise of the leader's heading [rad2/s]")
+
+
 class OwnEstimator(OwnPart, _Assumed):
     """An estimator of the user's own, made by a factory."""
 
@@ -108,10 +144,19 @@ EstimatorSettings = Annotated[
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
     | Annotated[FollowerSettings, Tag("FollowerSettings")]
+    | Annotated[MotionRadiusSettings, Tag("MotionRadiusSettings")]
+    | Annotated[PathPredictionSettings, Tag("PathPredictionSettings")]
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
     Discriminator(
         tag_by_kind(
-            AugmentedSettings, InteractingSettings, PaperSettings, ReckoningSettings, FollowerSettings, OwnEstimator
+            AugmentedSettings,
+            InteractingSettings,
+            PaperSettings,
+            ReckoningSettings,
+            FollowerSettings,
+            MotionRadiusSettings,
+            PathPredictionSettings,
+            OwnEstimator,
         )
     ),
 ]

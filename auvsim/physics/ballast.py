@@ -1,5 +1,6 @@
 """Ballast and trim of one vehicle: its net buoyancy and where its centres of gravity and buoyancy are."""
 
+from itertools import product
 from typing import Annotated
 
 import mujoco
@@ -56,18 +57,19 @@ def load(model: mujoco.MjModel, vehicle: str, ballast: BallastSettings) -> None:
     """Gives a vehicle of a compiled scene its weight and centre of gravity, before its hydrodynamics.
 
     Raises:
-        InputError: the net buoyancy is more than a tenth of the weight.
+        InputError: the net buoyancy is more than a tenth of the weight, or a centre is shifted out of the hull.
     """
-    if ballast.net_buoyancy == 0.0 and not any(ballast.cg_shift):
+    if ballast.is_zero:
         return
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)
     base, hull = model.body(f"{vehicle}/").id, model.body(f"{vehicle}/hull").id
+    _check_shifts(vehicle, ballast, _half_size(model, hull))
     whole, gravity = float(model.body_subtreemass[base]), -float(model.opt.gravity[2])
     if abs(ballast.net_buoyancy) > MOST * whole * gravity:
         raise InputError(
-            f"ballast.net_buoyancy: {ballast.net_buoyancy:g} N is more than {MOST:.0%} of the weight of '{vehicle}', "
-            f"{whole * gravity:.4g} N"
+            f"vehicles.{vehicle}.ballast.net_buoyancy: {ballast.net_buoyancy:g} N is more than {MOST:.0%} of the "
+            f"weight of '{vehicle}', {whole * gravity:.4g} N"
         )
     change = -ballast.net_buoyancy / gravity
     centre = _in_body(data, hull, data.subtree_com[base])
@@ -76,6 +78,38 @@ def load(model: mujoco.MjModel, vehicle: str, ballast: BallastSettings) -> None:
     model.body_mass[hull] = mass + change
     model.body_ipos[hull] = moment / (mass + change)
     mujoco.mj_setConst(model, data)
+
+
+def _half_size(model: mujoco.MjModel, hull: int) -> Array:
+    """Half the length, breadth and height (3,) of a hull [m], from its geoms."""
+    boxes = [model.geom_aabb[geom] for geom in range(model.ngeom) if model.geom_bodyid[geom] == hull]
+    places = [model.geom_pos[geom] for geom in range(model.ngeom) if model.geom_bodyid[geom] == hull]
+    turned = [model.geom_quat[geom] for geom in range(model.ngeom) if model.geom_bodyid[geom] == hull]
+    corners = [
+        place + _rotation(quaternion) @ (box[:3] + box[3:] * signs)
+        for box, place, quaternion in zip(boxes, places, turned, strict=True)
+        for signs in product((-1.0, 1.0), repeat=3)
+    ]
+    return 0.5 * np.ptp(corners, axis=0) if corners else np.full(3, np.inf)
+
+
+def _rotation(quaternion: Array) -> Array:
+    """Rotation matrix (3, 3) of a quaternion (4,)."""
+    matrix = np.zeros(9)
+    mujoco.mju_quat2Mat(matrix, quaternion)
+    return matrix.reshape(3, 3)
+
+
+def _check_shifts(vehicle: str, ballast: BallastSettings, most: Array) -> None:
+    """Sees that no centre is shifted by more than half the size (3,) of the hull [m]."""
+    for key in ("cg_shift", "cb_shift"):
+        shift = getattr(ballast, key)
+        if np.any(np.abs(shift) > most):
+            sizes = ", ".join(f"{size:.3g}" for size in most)
+            raise InputError(
+                f"vehicles.{vehicle}.ballast.{key}: {[*shift]} m is out of the hull of '{vehicle}'; give at most "
+                f"[{sizes}] m in size"
+            )
 
 
 def _in_body(data: mujoco.MjData, body: int, place: Array) -> Array:

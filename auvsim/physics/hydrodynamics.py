@@ -15,6 +15,7 @@ import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip_matrix
+from auvsim.base.settings import OTHERWISE
 from auvsim.physics import fluid, thrusters
 from auvsim.physics.forces import (
     BRAKE,
@@ -120,6 +121,8 @@ def _check(index: int, name: str, fields: dict[str, Array]) -> Body:
             raise InputError(f"'{name}_{field}' has {value.size} numbers instead of {count}")
         if not np.all(np.isfinite(value)):
             raise InputError(f"'{name}_{field}' is not finite")
+        if np.abs(value).max(initial=0.0) > OTHERWISE:
+            raise InputError(f"'{name}_{field}' has {np.abs(value).max():g}, more than {OTHERWISE:g}")
         if field not in _SIGNED and np.any(value < 0):
             raise InputError(f"'{name}_{field}' is negative: {value.min():g}")
         if field in _MATRICES:

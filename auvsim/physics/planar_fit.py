@@ -88,7 +88,7 @@ class Level:
         """Force and moment (6,) on a vehicle that moves straight ahead [N, N m], forward-starboard-down."""
         return FLIP6 * self._forward(u, 0.0, 0.0, Commands(rudder, elevator, shaft_speed))[:6]
 
-    def resistance(self, nu: Sequence[float]) -> Array:
+    def resistance(self, nu: Sequence[float] | Array) -> Array:
         """Force and moment (6,) on a vehicle of body velocity `nu` (6,), all actuators at rest; SNAME [N, N m]."""
         data = self.data
         mujoco.mj_resetData(self.model, data)
@@ -144,12 +144,15 @@ def _fit_model(vehicle: str, path: Path, text: str, speed: float, density: float
     rudder = level.actuation.fin_limit * draws[:, 1]
     n = shaft * (1.0 + 0.35 * draws[:, 2])
     v, r = 0.1 * u * draws[:, 3], 0.1 * u * draws[:, 4]
-    parameters, _, _ = _fit(level, speed, u, v, r, rudder, n)
-    for _ in range(2):
-        drift, rate = _steady_turn(parameters, rudder, speed)
-        v = u * (drift + 0.03 * draws[:, 3])
-        r = u * (rate + 0.05 * draws[:, 4])
-        parameters, residual, scale = _fit(level, speed, u, v, r, rudder, n)
+    try:
+        parameters, _, _ = _fit(level, speed, u, v, r, rudder, n)
+        for _ in range(2):
+            drift, rate = _steady_turn(parameters, rudder, speed)
+            v = u * (drift + 0.03 * draws[:, 3])
+            r = u * (rate + 0.05 * draws[:, 4])
+            parameters, residual, scale = _fit(level, speed, u, v, r, rudder, n)
+    except np.linalg.LinAlgError as error:
+        raise InputError(f"model {vehicle}: no planar model fits it ({error}); check its coefficients") from None
     return PlanarFit(
         vehicle=vehicle,
         speed=speed,
@@ -175,10 +178,14 @@ def _steady_turn(p: PlanarParameters, rudder: Array, speed: float) -> tuple[Arra
     """Drift v/u and rate r/u (n,) of steady turns: fixed-point iteration on the terms quadratic in v and r."""
     drift, rate = np.zeros_like(rudder), np.zeros_like(rudder)
     for _ in range(60):
+        if not (np.isfinite(drift).all() and np.isfinite(rate).all()):
+            raise np.linalg.LinAlgError("no steady turn")
         v, r = np.abs(drift), np.abs(rate)
         a, b = p.Y_uv + p.Y_vv * v + p.Y_v / speed, p.Y_ur - p.m + p.Y_rr * r + p.Y_r / speed
         c, d = p.N_uv + p.N_vv * v + p.N_v / speed, p.N_ur - p.m * p.x_g + p.N_rr * r + p.N_r / speed
         determinant = a * d - b * c
+        if not determinant.all():
+            raise np.linalg.LinAlgError("no steady turn")
         new_drift = -(d * p.Y_dd - b * p.N_dd) * rudder / determinant
         new_rate = -(a * p.N_dd - c * p.Y_dd) * rudder / determinant
         drift, rate = 0.5 * (drift + new_drift), 0.5 * (rate + new_rate)

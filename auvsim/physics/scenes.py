@@ -15,7 +15,7 @@ import numpy as np
 from dm_control import mjcf
 from pydantic import Field
 
-from auvsim.base.errors import InputError
+from auvsim.base.errors import InputError, at_key
 from auvsim.base.frames import Array, euler_to_quaternion, flip, flip_quaternion
 from auvsim.base.settings import Settings
 from auvsim.physics import hydrodynamics, scenery, soundness
@@ -86,9 +86,11 @@ def scene(
     Raises:
         InputError: a name or model cannot be used, or MuJoCo refuses the scene.
     """
-    poses, terrain = {name: pose for name, (_, pose) in structures.items()}, settings.floor
-    for model in fleet.values():
-        soundness.check(model, settings.water_density)
+    with at_key("water.terrain"):
+        poses, terrain = {name: pose for name, (_, pose) in structures.items()}, settings.floor
+    for name, model in fleet.items():
+        with at_key(f"vehicles.{name}.model"):
+            soundness.check(model, settings.water_density)
     composed = _composed(
         tuple((name, model, *library.source("vehicle", model)) for name, model in fleet.items()),
         tuple((name, model, *library.source("structure", model)) for name, (model, _) in structures.items()),
@@ -150,7 +152,10 @@ def _composed(
         rate: physics steps per second [Hz].
     """
     vehicles = {name: library.vehicle(model) for name, model, _, _ in fleet}
-    loaded = {name: library.structure(model) for name, model, _, _ in structures}
+    loaded = {}
+    for name, model, _, _ in structures:
+        with at_key(f"structures.{name}.model"):
+            loaded[name] = library.structure(model)
     # A depth that has room for a pillar, or has not, as the structure's own.
     floor = settings.floor.depth(0.0, 0.0)
     poses = {
@@ -254,8 +259,9 @@ def _check_depth(name: str, structure: library.Structure, pose: StructurePose, t
     radius, floor = structure.mouth_radius, terrain.depth(pose.north, pose.east)
     if not radius <= pose.depth <= floor - radius:
         raise InputError(
-            f"structure '{name}': a mouth of radius {radius:g} m at a depth of {pose.depth:g} m is not wholly between "
-            f"the surface and the sea floor at {floor:g} m; give a depth between {radius:g} and {floor - radius:g} m"
+            f"structures.{name}.depth: a mouth of radius {radius:g} m at a depth of {pose.depth:g} m is not wholly "
+            f"between the surface and the sea floor at {floor:g} m; give a depth between {radius:g} and "
+            f"{floor - radius:g} m"
         )
 
 

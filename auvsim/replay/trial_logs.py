@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.randomness import Noise, stream
 from auvsim.base.reading import Reading
 from auvsim.data.log import VehicleLog, read
+from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.physics.propulsion import propulsion
 from auvsim.replay.recording import DELIVERED, Arrival, Recording
 from auvsim.simulation import scenario
@@ -26,8 +28,9 @@ def recordings(path: Path) -> list[Recording]:
         InputError: It is no whole log, or no estimator ran in it.
     """
     log = read(path)
-    plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
-    return [_recording(log.vehicle(name), plan, path) for name in log.vehicles]
+    with library.given(log.models):
+        plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
+        return [_recording(log.vehicle(name), plan, path) for name in log.vehicles]
 
 
 def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
@@ -51,11 +54,17 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
         clock=np.unique(np.concatenate([times, *clock])),
         commands=[commands[k] for k in in_force.tolist()],
         arrivals=[a for rank, group in enumerate(sensors) for a in _arrivals(log, group, rank, plan)],
-        setup=lambda other: navigator_setup(plan, log.name, vehicle, other),
+        setup=lambda other: _setup(log, plan, vehicle, other),
         own=settings.estimator,
         vehicle=log,
         messages=list(_messages(log)) if "received" in log else (),
     )
+
+
+def _setup(log: VehicleLog, plan: Scenario, vehicle: library.Vehicle, settings: Any) -> NavigatorSetup:
+    """What an estimator of the log's vehicle is made from, with the models that the log holds."""
+    with library.given(log.log.models):
+        return navigator_setup(plan, log.name, vehicle, settings)
 
 
 def _arrivals(log: VehicleLog, group: str, rank: int, plan: Scenario) -> Iterator[Arrival]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, model_validator
 
-from auvsim.base.frames import rotation
+from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
 from auvsim.data.variables import Variable
@@ -16,7 +16,6 @@ from auvsim.physics.truth import Truth
 from auvsim.sensors import sonar_echo
 from auvsim.sensors.sensor import Sensor, Surroundings
 from auvsim.water.terrain_grid import GriddedFloor
-from estimators.core.types import Array
 
 FRAME = Variable(("beam", "bin"), "int8", "0.5 dB", "level above the noise in the middle of the ranges", "body")
 ELEVATIONS = 9  # rays to each beam that look for objects

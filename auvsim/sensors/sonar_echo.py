@@ -6,15 +6,15 @@ Gaussian beam in elevation, shadows behind what is higher, and a second path by 
 
 import math
 
+import numba
 import numpy as np
 
-from estimators.core.compiling import compiled
-from estimators.core.types import Array
+from auvsim.base.frames import Array
 
 BESIDE = 1.2  # widths from the beam's axis in elevation beyond which nothing is heard: 35 dB down
 
 
-@compiled
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def _bilinear(field, at_north, at_east):
     """Value of a field at a place in cells, and its slopes along both; held beyond the edge."""
     rows, columns = field.shape
@@ -30,7 +30,7 @@ def _bilinear(field, at_north, at_east):
     return value, to_north, to_east
 
 
-@compiled
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out):
     """Adds to `out` (beams, bins) the mean intensity of each beam and range, before the receiver's gain.
 
@@ -115,7 +115,7 @@ def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out
                     out[b, late] += ghost * echo
 
 
-@compiled
+@numba.njit(cache=True, nogil=True, error_model="numpy")
 def spread(mean, weights, out):
     """Mean intensities (beams, bins) as beams of finite width see them.
 

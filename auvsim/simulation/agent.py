@@ -86,6 +86,7 @@ class Agent:
         # The drive of a command is always that of the vehicle's own model, so that runs differ in nothing but the
         # estimator.
         ahead, holds = propulsion(settings.model, model_speed(settings.estimator), density)
+        self.holds = holds  # whether the vehicle can hold a speed through the water [m/s]
         heading = math.radians(start.heading_deg)
         self.dock = usbl_dock(plan, name)
         self.serves = bool(self.dock) and settings.sensors.usbl.enabled  # whether its USBL does

@@ -35,7 +35,7 @@ def of_model(model: Any) -> dict[str, Any]:
 def layered(base: Mapping, *layers: Mapping) -> dict:
     """`base` with layers on top, one after the other; settings of a vehicle's controller lie between it and them.
 
-    They are those of the last layer that gives the vehicle's model, in the short form of a scenario; in full, of each vehicle.
+    They are those of the last layer that gives the vehicle's model, in the short form of a scenario.
     """
     models = [layer["vehicle"]["model"] for layer in layers if _gives_model(layer)]
     plan = sampling.merge(base, {"control": of_model(models[-1])}) if models else dict(base)

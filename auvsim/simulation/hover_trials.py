@@ -1,4 +1,4 @@
-"""Trials of a hovering vehicle: speed against force in each axis, stopping, a step of its place, holding in a current."""
+"""Trials of a hovering vehicle: speed against force by axis, stopping, a step of its place, holding in a current."""
 
 import math
 from collections.abc import Callable
@@ -90,7 +90,7 @@ def run(model: str, progress: Callable[[float], None] = lambda _: None) -> Hover
     fast = Wrench(*(-level.resistance((0.75 * top, 0.0, 0.0, 0.0, 0.0, 0.0))).tolist())
     stop = bench.sail(lambda _, t: pilot.hold(t, here), 60.0, start=fast, speed=0.75 * top, until=_is_still)
     progress(0.4)
-    pilot, goal = _Pilot(model), here + (STEP, 0.0, 0.0)
+    pilot, goal = _Pilot(model), here + np.array((STEP, 0.0, 0.0))
     bench.sail(lambda _, t: pilot.hold(t, here), 20.0, start=rest)
     step = bench.sail(lambda _, t: pilot.hold(t, goal), 40.0)
     ahead = np.array([t.position[0] for t in step])

@@ -23,12 +23,13 @@ from auvsim.data.log import Log
 from auvsim.missions.mission import Mission, Place
 from auvsim.navigation.navigator import Navigator
 from auvsim.physics.truth import Truth
+from auvsim.simulation import starts
 from auvsim.simulation.agent import Agent
 from auvsim.simulation.building import (
     build_world,
     check_steps,
     current,
-    refuse_overlaps,
+    naming_part,
     structure_model,
     vehicle_model,
 )
@@ -140,13 +141,12 @@ class Simulation:
             name: Place(name=name, pose=settings.pose, structure=structure_model(self.world, name, settings.model))
             for name, settings in scenario.structures.items()
         }
-        self.agents = [
-            agents(
-                name, scenario, vehicle_model(self.world, name, settings.model), self._places, noise(name),
-                navigator=(navigators or {}).get(name), mission=(missions or {}).get(name),
-            )
-            for name, settings in scenario.vehicles.items()
-        ]  # fmt: skip
+        self.agents = []
+        for name, settings in scenario.vehicles.items():
+            model = vehicle_model(self.world, name, settings.model)
+            own = {"navigator": (navigators or {}).get(name), "mission": (missions or {}).get(name)}
+            with naming_part(name):
+                self.agents.append(agents(name, scenario, model, self._places, noise(name), **own))
         self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.serves]
         links = {
             usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
@@ -164,7 +164,7 @@ class Simulation:
             start = settings.start
             place = np.array(scenario.start_position(name))
             self.place(name, place, math.radians(start.heading_deg), start.speed)
-        refuse_overlaps(self.world)
+        starts.check(scenario, self.world, self.agents, self._places)
         self.log: Any = Unrecorded()
         if record:
             self.log = recorder(scenario, self.agents, self._places, self._usbl, seed=seed, trial=trial, path=path)

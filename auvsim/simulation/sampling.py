@@ -72,10 +72,10 @@ def merge(base: Mapping, override: Mapping, key: str = "") -> dict:
 
     The keys beside a `kind` are its own: another kind leaves them behind, but those of an estimator that it shares.
     """
-    if is_distribution(base) or is_distribution(override):
-        return dict(override)
-    if key == "":
+    if key == "":  # the whole scenario, which is no distribution whatever its keys are called
         base, override = short.renewed(base), short.renewed(override)
+    elif is_distribution(base) or is_distribution(override):
+        return dict(override)
     if "kind" in override and override["kind"] != base.get("kind"):
         shared = short.estimator_keys(str(override["kind"])) - {"kind"} if key == "estimator" else set()
         return {name: value for name, value in base.items() if name in shared} | dict(override)

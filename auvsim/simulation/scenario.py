@@ -18,6 +18,8 @@ from auvsim.control.registry import ControlSettings
 from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
+from auvsim.missions.track.mission import TrackSettings
+from auvsim.missions.track.patterns import Circle, Weave, points
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
@@ -172,15 +174,11 @@ class Scenario(Settings):
 
     @model_validator(mode="after")
     def _all_in_the_water(self) -> "Scenario":
-        if self.water.terrain.kind == "grid":
-            return self  # the world sees to it, which reads the file
-        terrain = self.world.floor
-        places = [(f"structures.{name}.depth", s.pose.position.tolist()) for name, s in self.structures.items()]
-        places += [(f"vehicles.{name}.start.depth", self.start_position(name)) for name in self.vehicles]
-        for key, (north, east, depth) in places:
-            floor = terrain.depth(north, east)
-            if not 0.0 < depth < floor:
-                raise ValueError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
+        if self.water.terrain.kind != "grid":  # whose file is read when the run begins
+            try:
+                check_depths(self)
+            except InputError as error:
+                raise ValueError(str(error)) from None
         return self
 
     @property
@@ -241,6 +239,33 @@ class Scenario(Settings):
         for name, vehicle in self.vehicles.items():
             for sensor, rate in rated(vehicle.sensors):
                 yield f"vehicles.{name}.sensors.{sensor}.rate", rate, "control", rates.control
+
+
+def check_depths(scenario: Scenario) -> None:
+    """Sees that structures, starts and the waypoints of tracks are between the surface and the sea floor.
+
+    Raises:
+        InputError: one is not; the text begins with its dotted key.
+    """
+    terrain = scenario.world.floor
+    for key, north, east, depth in _places(scenario):
+        floor = terrain.depth(north, east)
+        if not 0.0 < depth < floor:
+            raise InputError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
+
+
+def _places(scenario: Scenario) -> Iterator[tuple[str, float, float, float]]:
+    """Dotted key of its depth, north, east, down [m] of all that a scenario places in the water."""
+    for name, structure in scenario.structures.items():
+        yield f"structures.{name}.depth", structure.north, structure.east, structure.depth
+    for name, vehicle in scenario.vehicles.items():
+        yield f"vehicles.{name}.start.depth", *scenario.start_position(name)
+        if isinstance(vehicle.mission, TrackSettings):
+            pattern = vehicle.mission.pattern
+            north, east, _ = scenario.start_position(name)
+            ways = [[north, east]] if isinstance(pattern, Weave | Circle) else points(pattern).tolist()
+            for north, east in ways:
+                yield f"vehicles.{name}.mission.depth", north, east, vehicle.mission.depth
 
 
 def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:

@@ -1,4 +1,4 @@
-"""Sea trials of a vehicle that fins steer: what its MJCF does, without noise, as one would hold it against a data sheet.
+"""Sea trials of a vehicle that fins steer: what its MJCF does, without noise, as one holds it against a data sheet.
 
 Still water, 60 m down. Turning circles and zig-zags are judged as ITTC 7.5-02-06-01 and IMO MSC.137(76) have them.
 """
@@ -223,7 +223,7 @@ def motion_of(truths: list[Truth], rudders: Array) -> Motion:
     """A manoeuvre in still water from its true states, from a heading of north."""
     position, heading = np.array([t.position for t in truths]), np.unwrap([t.attitude[2] for t in truths])
     return Motion(
-        time=PERIOD * np.arange(len(truths)),
+        time=PERIOD * np.arange(len(truths), dtype=np.float64),
         track=position[:, :2] - position[0, :2],
         heading=heading - heading[0],
         velocity=np.array([t.nu[[0, 1, 5]] for t in truths]),
@@ -247,7 +247,7 @@ class _Zigzag:
 
 
 def _turning_time(fit: PlanarFit, rudder: float) -> float:
-    """Time of two turns, roughly, by the slopes of a straight course; at least a minute and a half, at most five [s]."""
+    """Time of two turns, roughly, by the slopes of a straight course; from a minute and a half to five [s]."""
     p, u = fit.parameters, fit.speed
     force = np.array(((p.Y_uv * u + p.Y_v, (p.Y_ur - p.m) * u + p.Y_r), (p.N_uv * u + p.N_v, p.N_ur * u + p.N_r)))
     rate = abs(float(np.linalg.solve(force, (-p.Y_dd * u * u * rudder, -p.N_dd * u * u * rudder))[1]))

@@ -2,6 +2,7 @@
 
 from typing import Any
 
+from auvsim.base.errors import at_key
 from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.physics import planar_sets
 from auvsim.simulation.scenario import Scenario
@@ -34,12 +35,14 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
     """
     own, dock = plan.vehicles[name], usbl_dock(plan, name)
     assumed = own.estimator if settings is None else settings
+    parameters = None
+    if not isinstance(vehicle.actuation, Thrusters):
+        with at_key(f"vehicles.{name}.estimator.model"):
+            parameters = planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density)
     return NavigatorSetup(
         vehicle=name,
         settings=assumed,
-        parameters=None
-        if isinstance(vehicle.actuation, Thrusters)
-        else planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density),
+        parameters=parameters,
         actuation=vehicle.actuation,
         period=1.0 / plan.rates.filter,
         rates=dict(rated(own.sensors)),

@@ -26,6 +26,17 @@ from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
 
+FULL_KEYS = {  # keys of the full form as patterns, in turn, and what they are in the short one
+    r"vehicles\.[\w-]+\.(model|start|ballast)\b": r"vehicle.\1",
+    r"vehicles\.[\w-]+\.": "",
+    r"structures\.[\w-]+\b": "dock",
+    r"physics\.integrator\b": "world.integrator",
+    r"water\.density\b": "world.water_density",
+    r"water\.(sea_floor|terrain)\b": r"world.\1",
+    r"water\.current\b": "current",
+    r"network\.acoustics\b": "acoustics",
+}
+
 
 class LoneVehicle(Settings):
     """The vehicle, its start and its ballast."""
@@ -74,7 +85,7 @@ def parse(values: Mapping, places: Mapping[str, str] | None = None) -> Scenario:
         return Scenario.model_validate(whole)
     except ValidationError as error:
         path, _, text = error.errors()[0]["msg"].removeprefix("Value error, ").partition(": ")
-        path = _short_key(path, short)
+        path = short_key(path, short.mission is None)
         raise InputError(": ".join(part for part in (schema.place(path, places), path, text) if part)) from None
 
 
@@ -155,11 +166,15 @@ def _model_name(kind: str, model: str, key: str, places: Mapping[str, str]) -> s
         raise InputError(": ".join(part for part in (schema.place(key, places), key, str(error)) if part)) from None
 
 
-def _short_key(path: str, short: ShortScenario) -> str:
-    """The short form of a dotted key of the full form."""
-    path = re.sub(r"^vehicles\.[\w-]+\.(model|start|ballast)\b", r"vehicle.\1", path)
-    path = re.sub(r"^vehicles\.[\w-]+\.", "", path)
-    path = re.sub(r"^structures\.[\w-]+\.", "dock.", path)
-    if short.mission is None and path.startswith("mission."):
+def short_key(path: str, docks: bool) -> str:
+    """The short form of a dotted key of the full form.
+
+    Args:
+        path: of the full form.
+        docks: whether the mission is a docking or manoeuvre, whose keys stand under `guidance`.
+    """
+    for full, key in FULL_KEYS.items():
+        path = re.sub(rf"^{full}", key, path)
+    if docks and path.startswith("mission."):
         return path.replace("mission.", "guidance.", 1)
     return path

@@ -14,6 +14,7 @@ STUDIES = {  # name of the module: its line of help
     "comparison": "The same docking trials with each estimator, in steady and in turning currents.",
     "identification": "Fits of planar vehicles with known parameters: coverage, convergence, process noise.",
     "held_out": "Identification of the MuJoCo vehicle, judged by predicting manoeuvres that were held out.",
+    "time_steps": "What a time step costs: position after a minute by integrator and rate, contact by rate.",
     "identified_docking": "The same docking trials with the fitted, the identified and a wrong planar model.",
     "formation": "Four vehicles in formation: station keeping, and what the leaders' shape is worth to the follower.",
 }

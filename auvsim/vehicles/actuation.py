@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from operator import mul
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -60,7 +60,7 @@ class Actuation(Protocol):
         """Commands of the n channels that carry out a demand."""
         ...
 
-    def effective(self, channels: "Sequence[float] | Array") -> Commands:
+    def effective(self, channels: "Sequence[float] | Array") -> Any:
         """Demand to which measured values of the n channels amount."""
         ...
 

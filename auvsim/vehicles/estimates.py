@@ -1,4 +1,4 @@
-"""Coefficients of a torpedo-shaped hull and its fins from a data sheet: Lamb, strip theory, lift slopes, friction lines.
+"""Coefficients of a torpedo-shaped vehicle from its data sheet: Lamb, strip theory, lift slopes, friction line.
 
 Each is what literature gives where nothing is measured; errors of 20 to 50 % are usual. Axes about amidships.
 """
@@ -38,7 +38,7 @@ class Estimates:
 
 
 def lamb(length: float, diameter: float) -> tuple[float, float, float]:
-    """Lamb's factors of a prolate spheroid: along, across, turning (Lamb 1932, art. 114, 115; Fossen 2021, sec. 8.4.2)."""
+    """Lamb's factors of a prolate spheroid: along, across, turning (Lamb 1932, art. 114; Fossen 2021, sec. 8.4.2)."""
     a, b = 0.5 * length, 0.5 * diameter
     e = math.sqrt(1.0 - (b / a) ** 2)
     log = math.log((1.0 + e) / (1.0 - e))
@@ -112,8 +112,8 @@ def _propeller(sheet: Sheet, drag: float) -> tuple[float, float]:
         found = thrust(sheet.propeller_diameter)
         if not found > 0.2 * needed:
             raise InputError(
-                f"propeller_diameter: a screw of {sheet.propeller_diameter:g} m at {sheet.shaft_rpm:g} rpm does not drive "
-                f"{sheet.top_speed:g} m/s; give a larger one, or a higher shaft_rpm"
+                f"propeller_diameter: a screw of {sheet.propeller_diameter:g} m at {sheet.shaft_rpm:g} rpm does not "
+                f"drive {sheet.top_speed:g} m/s; give a larger one, or a higher shaft_rpm"
             )
         return sheet.propeller_diameter, needed / found
     low, high = 0.01, 2.0 * sheet.diameter

@@ -1,5 +1,7 @@
 """A vehicle of a data sheet: its MJCF, its README, and the list of its numbers, in which every estimate is marked."""
 
+# ruff: noqa: E501 (a row of a table or of MJCF is one line)
+
 import math
 from typing import NamedTuple
 

@@ -2,6 +2,9 @@
 
 import math
 import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,6 +16,7 @@ from dm_control import mjcf
 import auvsim
 from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.frames import Array, flip
+from auvsim.base.settings import OTHERWISE
 from auvsim.vehicles.actuation import FinsAndShaft, Thrusters
 
 
@@ -54,7 +58,8 @@ class Structure:
 ALIGNED = math.radians(5.0)  # of docks that do not say within which angle a vehicle is aligned [rad]
 PACKAGE = Path(auvsim.__file__).parent
 _MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
-INSTANCE = re.compile(r"[A-Za-z_][\w-]{0,63}", re.ASCII)  # what a vehicle or structure may be called
+INSTANCE = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")  # what a vehicle or structure may be called
+_GIVEN: ContextVar[Mapping[tuple[str, str], str] | None] = ContextVar("given", default=None)  # see `given`
 _MARKS = {"vehicle": '<body name="hull"', "structure": '<site name="capture"'}  # what every MJCF of a kind has
 
 
@@ -100,8 +105,25 @@ def find(kind: str, name: str) -> Path:
     return path
 
 
+@contextmanager
+def given(texts: Mapping[tuple[str, str], str]) -> Iterator[None]:
+    """Takes models from texts, such as a log holds, and not from their files.
+
+    Args:
+        texts: MJCF by kind (`vehicle` or `structure`) and name; other models are read from their files.
+    """
+    before = _GIVEN.set({**(_GIVEN.get() or {}), **texts})
+    try:
+        yield
+    finally:
+        _GIVEN.reset(before)
+
+
 def source(kind: str, name: str) -> tuple[Path, str]:
-    """The MJCF file of a model and its text now; arguments and errors as of `find`."""
+    """The MJCF file of a model and its text now, or the text that is `given`; arguments and errors as of `find`."""
+    held = _GIVEN.get() or {}
+    if (kind, name) in held:
+        return Path(name), held[kind, name]
     path = find(kind, name)
     return path, _read(path)
 
@@ -141,6 +163,8 @@ def _numeric(root: Any, where: str, name: str) -> Any:
     data = np.atleast_1d(np.array([] if element.data is None else element.data, dtype=float))
     if not data.size or not np.isfinite(data).all():
         raise InputError(f"model {where}: the numeric '{name}' is {data.tolist()}; its data must be finite numbers")
+    if np.abs(data).max() > OTHERWISE:
+        raise InputError(f"model {where}: the numeric '{name}' has {np.abs(data).max():g}, more than {OTHERWISE:g}")
     return data
 
 

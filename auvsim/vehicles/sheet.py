@@ -1,4 +1,4 @@
-"""Data sheets of torpedo-shaped vehicles with four tail fins: what makers publish, from which `mjcf` makes a vehicle."""
+"""Data sheets of torpedo-shaped vehicles with four tail fins: what makers publish, checked."""
 
 import math
 from pathlib import Path
@@ -43,7 +43,8 @@ class Sheet(Settings):
     def _fits(self) -> "Sheet":
         if not 3.0 <= self.length / self.diameter <= 20.0:
             raise ValueError(
-                f"diameter: the hull is {self.length / self.diameter:.3g} times as long as wide; estimates hold for 3 to 20"
+                f"diameter: the hull is {self.length / self.diameter:.3g} times as long as wide; estimates hold "
+                "for 3 to 20"
             )
         cylinder = math.pi / 4.0 * self.diameter**2 * self.length * DENSITY
         if not FULL[0] * cylinder <= self.mass <= FULL[1] * cylinder:

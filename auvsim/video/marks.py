@@ -1,6 +1,7 @@
 """What is drawn into the scene beside its bodies: tracks, fixes, the estimate, the water's motion, enlarged symbols."""
 
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -208,7 +209,8 @@ def _gate_distance(playback: Playback, dock: Dock) -> float:
     for motion in playback.motions.values():
         if motion.log.attributes.get("dock") == dock.name and "mission_settings" in motion.log.attributes:
             settings = yaml_text.read(str(motion.log.attributes["mission_settings"]), "log").value
-            return float(settings.get("gate_distance", GATE_DISTANCE))
+            distance = settings.get("gate_distance") if isinstance(settings, Mapping) else None
+            return float(distance) if isinstance(distance, int | float) else GATE_DISTANCE
     return GATE_DISTANCE
 
 

@@ -14,6 +14,7 @@ from auvsim.data.log import Log, StructureLog
 from auvsim.physics import scenery, scenes
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation import scenario
+from auvsim.vehicles import library
 from auvsim.video.motion import Motion, VehicleMoment
 
 
@@ -61,13 +62,14 @@ class Playback:
         self.log = log
         self.motions = {name: Motion(log.vehicle(name)) for name in log.vehicles}
         self.docks = {name: Dock.of(log.structure(name)) for name in log.structures}
-        plan = scenario.from_yaml(str(log.attributes["scenario"]), "scenario in the log")
-        scene = scenes.scene(
-            {name: _model(name, plan.vehicles) for name in log.vehicles},
-            {name: (_model(name, plan.structures), _pose(log.structure(name))) for name in log.structures},
-            plan.world,
-            plan.rates.physics,
-        )
+        with library.given(log.models):
+            plan = scenario.from_yaml(str(log.attributes["scenario"]), "scenario in the log")
+            scene = scenes.scene(
+                {name: _model(name, plan.vehicles) for name in log.vehicles},
+                {name: (_model(name, plan.structures), _pose(log.structure(name))) for name in log.structures},
+                plan.world,
+                plan.rates.physics,
+            )
         self.model, self._vehicles = scene.model, scene.vehicles
         scenery.paint_sea_floor(self.model)
         scenery.widen(self.model, max(float(np.abs(m.positions[:, :2]).max()) for m in self.motions.values()))

@@ -64,6 +64,8 @@ def read_variables(path: Path) -> dict[str, Variable]:
     Raises:
         InputError: there is no such file, or it is no NetCDF.
     """
+    if path.is_dir():
+        raise InputError(f"{path}: it is a folder, not a file")
     if not path.is_file():
         raise InputError(f"{path}: no such file")
     try:

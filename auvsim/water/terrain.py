@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Annotated, Literal, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import Field
 
 from auvsim.base.errors import InputError
@@ -17,6 +18,8 @@ from auvsim.water.seabed import SeabedSettings, make
 from auvsim.water.terrain_grid import Corner, GriddedFloor
 
 MOST_POINTS = 4097  # of a grid along each side, after it is made regular
+DEEPEST = 12_000.0  # [m]
+STEEPEST = 5.0  # slope on both sides of a point from which on it is an error of sounding [-]
 _DOWN = ("sea_floor_depth_below_mean_sea_level", "sea_floor_depth_below_sea_surface", "sea_floor_depth_below_geoid")
 _UP = ("height_above_mean_sea_level", "height_above_geopotential_datum", "height_above_reference_ellipsoid", "altitude")
 
@@ -148,7 +151,36 @@ def _gridded(settings: DepthGridSettings) -> GriddedFloor:
             axes[which], values = axes[which][::-1], np.flip(values, i)
     if not np.isfinite(values).all():
         raise InputError(f"{(~np.isfinite(values)).sum()} of {values.size} points have no depth; fill them")
+    _check_depths(axes["north"], axes["east"], values)
     return _regular(axes["north"], axes["east"], values)
+
+
+def _check_depths(north: Array, east: Array, depths: Array) -> None:
+    """Refuses depths (n, m) [m] that no sea has: heights taken for depths, fill values, spikes.
+
+    Raises:
+        InputError: one line with the first place at fault.
+    """
+    if depths.max() <= 0.0:
+        raise InputError(f"all depths are 0 or less, down to {depths.min():g} m; of heights say `positive: up`")
+    deepest = float(np.abs(depths).max())
+    if deepest > DEEPEST:
+        raise InputError(f"a depth of {deepest:g} m is more than that of any sea, {DEEPEST:g} m; is it a fill value?")
+    for spiked in (_spikes(north, depths), _spikes(east, depths.T).T):
+        for i, j in np.argwhere(spiked):
+            raise InputError(
+                f"the depth of {depths[i, j]:g} m at north {north[i]:g} m, east {east[j]:g} m is a spike, steeper than "
+                f"{STEEPEST:g} to 1 on either side; mend it"
+            )
+
+
+def _spikes(axis: Array, depths: Array) -> NDArray[np.bool_]:
+    """Points (n, m) that are steeply above or below both their neighbours along the first axis (n,) [m]."""
+    slopes = np.diff(depths, axis=0) / np.diff(axis)[:, None]
+    before, after = slopes[:-1], -slopes[1:]
+    spiked = np.zeros(depths.shape, dtype=bool)
+    spiked[1:-1] = (np.minimum(np.abs(before), np.abs(after)) > STEEPEST) & (before * after > 0.0)
+    return spiked
 
 
 def _depth_variable(variables: dict[str, grid_file.Variable], settings: DepthGridSettings) -> tuple[str, float]:

@@ -109,13 +109,19 @@ class ParticleFilter:
             if not total > 0.0:
                 raise NotFiniteError(f"no particle explains {measurement.kind} {measurement.value} at {node_time} s")
             state = state._replace(weights=weights / total, verdicts=(*state.verdicts, (measurement, "", math.nan)))
-        if state.effective < self._threshold * len(state.weights):
-            state = self._resampled(state)
-        return state
+        return self._kept_effective(state)
+
+    def weigh(self, state: ParticleState, log_likelihoods: Array) -> ParticleState:
+        """Particles weighed by log likelihoods (k,) that are at hand, and resampled where few of them count."""
+        weights = state.weights * np.exp(log_likelihoods - log_likelihoods.max())
+        return self._kept_effective(state._replace(weights=weights / weights.sum()))
 
     def process_after(self, state: ParticleState) -> ProcessModel:
         """For `smoothing`, of the particles' mean and covariance."""
         return self.process
+
+    def _kept_effective(self, state: ParticleState) -> ParticleState:
+        return self._resampled(state) if state.effective < self._threshold * len(state.weights) else state
 
     def _resampled(self, state: ParticleState) -> ParticleState:
         count = len(state.weights)

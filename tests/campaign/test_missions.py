@@ -182,7 +182,7 @@ def test_a_mission_of_ones_own(pool: Pool, tmp_path: Path) -> None:
     ("name", "message"),
     [
         ("Vague", "mission 'campaign_missions:Vague': metric 'deepest' is 'deep', not of the declared type float"),
-        ("Silent", "mission 'campaign_missions:Silent': its metrics lack 'calm', which it declares"),
+        ("Silent", "mission 'campaign_missions:Silent': its metrics cannot be had: KeyError: 'no such group'"),
     ],
 )
 def test_metrics_that_are_wrong_are_an_error_of_the_trial(name: str, message: str, pool: Pool, tmp_path: Path) -> None:

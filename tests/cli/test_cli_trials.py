@@ -82,11 +82,14 @@ def test_divergence_is_diagnosed(
     ("arguments", "text"),
     [
         (["--vehicle.model", "remus"], "command line: vehicle.model: no vehicle 'remus'; there are "),
-        (["--vehicle.model", "broken.xml"], "model broken.xml: "),
+        (["--vehicle.model", "broken.xml"], "command line: vehicle.model: model broken.xml: "),
         (["--vehicle.model", "none.xml"], "command line: vehicle.model: model none.xml: "),
-        (["--dock.model", "remus100"], "model remus100 lacks "),
+        (["--dock.model", "remus100"], "command line: dock.model: model remus100 lacks "),
         (["--estimator", "kalman"], "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm"),
-        (["--estimator", "nowhere:factory"], "estimator 'nowhere:factory': ModuleNotFoundError"),
+        (
+            ["--estimator", "nowhere:factory"],
+            "command line: estimator: estimator 'nowhere:factory': ModuleNotFoundError",
+        ),
         (
             ["--vehicle.start.depth", "100"],
             "command line: vehicle.start.depth: 100 m is not between the surface and the",

@@ -23,6 +23,7 @@ from auvsim.base.errors import InputError
 from auvsim.campaign import plan as plans
 from auvsim.cli import main
 from auvsim.data import log
+from auvsim.identification import readers
 from auvsim.physics import soundness
 from auvsim.simulation import sampling, scenario
 from auvsim.simulation.run import run
@@ -147,6 +148,36 @@ def spoil_log(folder: Path, whole: bytes, changes: list[tuple[float, int]], end:
     assert time.process_time() - begin < MOST
 
 
+def table() -> bytes:
+    """A CSV log of 40 s at 5 Hz: a rudder that steps to and fro, and a heading that follows."""
+    lines = ["time [s],rudder [deg],n [rpm],heading [deg],u [m/s]"]
+    heading = 0.0
+    for k in range(200):
+        rudder = 10.0 if (k // 40) % 2 else -10.0
+        heading += 0.1 * rudder
+        lines.append(f"{0.2 * k:.1f},{rudder:.1f},900,{heading % 360.0:.2f},1.5{k % 7}")
+    return "\n".join(lines).encode()
+
+
+def spoil_table(
+    folder: Path, changes: list[tuple[float, int]], cells: list[tuple[float, int, str]], end: float
+) -> None:
+    """Reads a CSV log some of whose cells and bytes are others, or whose end is missing: records, or one line."""
+    rows = [line.split(",") for line in table().decode().splitlines()]
+    for place, column, text in cells:
+        rows[min(int(place * len(rows)), len(rows) - 1)][column] = text
+    whole = "\n".join(",".join(row) for row in rows).encode("utf-8", "surrogatepass")
+    content = bytearray(whole[: max(1, round(end * len(whole)))])
+    for place, value in changes:
+        content[min(int(place * len(content)), len(content) - 1)] = value
+    path = folder / "spoiled.csv"
+    path.write_bytes(content)
+    begin = time.process_time()
+    with contextlib.suppress(InputError):
+        readers.read([path], vehicle="remus100")
+    assert time.process_time() - begin < MOST
+
+
 pairs = st.lists(st.tuples(st.sampled_from(KEYS), values), min_size=1, max_size=3)
 extras = st.dictionaries(
     st.sampled_from(["name", "seed", "trials", "grid", "variants", "stop", "timeout", "keep"]), values, max_size=2
@@ -154,6 +185,8 @@ extras = st.dictionaries(
 shares = st.floats(0.0, 1.0)
 changed = st.lists(st.tuples(shares, st.integers(0, 255)), max_size=8)
 ends = st.one_of(st.just(1.0), shares)
+texts = st.one_of(numbers.map(str), st.text(max_size=8), st.sampled_from(["", "NaN", "-9999", "1e35", "0,5", "12:30"]))
+cells = st.lists(st.tuples(shares, st.integers(0, 4), texts), max_size=5)
 finite_or_not = st.lists(st.floats() | st.sampled_from([0.0, -1.0, 1e-12, 1e12, math.nan]), min_size=1, max_size=6)
 
 
@@ -189,6 +222,32 @@ def test_models(folders, name, found, count) -> None:
 def test_logs(folders, whole_log, changes, end) -> None:
     """Any bytes of a log changed, any end cut off."""
     spoil_log(folders(), whole_log, changes, end)
+
+
+@CI
+@given(changed, cells, ends)
+def test_tables(folders, changes, found, end) -> None:
+    """Any cells and bytes of a CSV log changed, any end cut off."""
+    spoil_table(folders(), changes, found, end)
+
+
+@pytest.mark.slow
+@SLOW
+@given(changed, cells, ends)
+def test_many_tables(folders, changes, found, end) -> None:
+    """As above."""
+    spoil_table(folders(), changes, found, end)
+
+
+@pytest.mark.parametrize("stamp", ["-5.764607523034234e+17", "-7.205759403792791e+16", "1e12"])
+def test_a_stamp_of_another_age(tmp_path, stamp: str) -> None:
+    """Its record would not fit into memory."""
+    spoil_table(tmp_path, [], [(0.5, 0, stamp)], 1.0)
+
+
+def test_a_lift_that_no_fit_bears(tmp_path) -> None:
+    """Its planar model has no steady turn."""
+    spoil_model(tmp_path, "rudder_lower_lift_slope", [1e12], 16, sails=True)
 
 
 @pytest.mark.slow

@@ -55,7 +55,9 @@ def test_a_vehicle_that_surfaces_says_so_once():
 
 
 def test_a_vehicle_that_runs_aground_says_so_once():
-    log = run(manoeuvre(6.0, 11.5, world={"sea_floor": 10.0}))
+    start = {"north": 0.0, "east": 0.0, "depth": 6.0, "speed": 1.5}
+    heavy = {"start": start, "ballast": {"net_buoyancy": -20.0}}  # so that it stays down and does not bounce
+    log = run(manoeuvre(6.0, 9.99, world={"sea_floor": 10.0}, vehicle=heavy))
     assert limits(log) == ["grounded"]
     event = log.groups["event"]
     at = event["kind"].tolist().index("grounded")
@@ -68,7 +70,8 @@ def test_a_vehicle_that_runs_aground_says_so_once():
 def test_a_slope_is_run_into():
     """Level at 6 m towards a floor that rises from 8 m by 0.2: 2 m less the hull is met after 9 m and more."""
     terrain = {"kind": "slope", "gradient": 0.2, "direction_deg": 180.0}
-    log = run(manoeuvre(6.0, 6.0, duration=12.0, world={"sea_floor": 8.0, "terrain": terrain}))
+    track = {"kind": "track", "depth": 6.0, "radius": 0.1, "pattern": {"kind": "waypoints", "points": [[9.8, 0.0]]}}
+    log = run(manoeuvre(6.0, 6.0, duration=12.0, world={"sea_floor": 8.0, "terrain": terrain}, mission=track))
     assert limits(log) == ["grounded"]
     truth = log.groups["vehicles/remus100/truth"]
     contact = log.groups["vehicles/remus100/contact"]

@@ -275,7 +275,7 @@ def test_places_of_a_fleet() -> None:
         ("vehicles.a.estimator.turn_interval", 9.0, "vehicles.a.estimator.turn_interval: unknown key"),
         ("vehicles.a.start.north", 3.0, "vehicles.a.start: north and east go together"),
         ("vehicles.a.mission.kind", "dock", "vehicles.a.mission: no kind 'dock'; there are docking, manoeuvre, track"),
-        ("vehicles.a b.model", "remus100", "vehicles.a b: a b should match pattern"),
+        ("vehicles.a b.model", "remus100", "vehicles.a b: a name is 1 to 64 letters"),
         ("vehicle.model", "remus100", "vehicle: unknown key; did you mean vehicles?"),
     ],
 )

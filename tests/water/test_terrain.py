@@ -131,5 +131,5 @@ def test_the_doppler_log_measures_to_the_floor_below_it():
 
 def test_a_dock_in_the_slope_is_refused():
     settings = WorldSettings(terrain=SlopeSettings(gradient=0.2, direction_deg=180.0))
-    with pytest.raises(InputError, match=r"structure 'dock': a mouth .* the sea floor at 30 m"):
+    with pytest.raises(InputError, match=r"structures.dock.depth: a mouth .* the sea floor at 30 m"):
         scenes.scene({}, {"dock": ("dock", StructurePose(north=50.0, depth=29.8, heading=0.0))}, settings, 100.0)

@@ -1,4 +1,4 @@
-"""What a dock says of itself in its packets: the means of its reported heading and depth, and when it was last heard."""
+"""What a dock says of itself in its packets: means of its heading and depth, and when it was last heard."""
 
 import math
 from collections.abc import Sequence

@@ -18,8 +18,8 @@ def require_thrusters(setup: MissionSetup) -> None:
     """
     if not isinstance(setup.vehicle.actuation, Thrusters):
         raise InputError(
-            f"mission {setup.settings.kind} of '{setup.name}': '{setup.vehicle.model}' cannot hover; it needs a vehicle "
-            "that thrusters drive, such as bluerov2_heavy"
+            f"mission {setup.settings.kind} of '{setup.name}': '{setup.vehicle.model}' cannot hover; it needs a "
+            "vehicle that thrusters drive, such as bluerov2_heavy"
         )
 
 

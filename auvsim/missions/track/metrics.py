@@ -1,14 +1,24 @@
 """Metrics of a track: pure functions of its log."""
 
+import json
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from pydantic import ValidationError
 
-from auvsim.base import yaml_text
+from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
+from auvsim.base.settings import Settings
 from auvsim.data.log import VehicleLog
 from auvsim.missions.track import patterns
+
+
+class _Settings(Settings):
+    """What of a track's settings its metrics need."""
+
+    pattern: patterns.Pattern
 
 
 def track_metrics(log: VehicleLog) -> dict[str, Any]:
@@ -17,11 +27,7 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
     The transit to the first waypoint is not a leg of the track and does not count.
     """
     mission, truth = log["mission"], log["truth"]
-    if "mission_settings" not in log.attributes:
-        raise InputError(f"the log of '{log.name}' lacks 'mission_settings', which says what its track is")
-    settings = yaml_text.read(str(log.attributes["mission_settings"]), "log").value
-    pattern = settings["pattern"]
-    way: Any = patterns.KINDS[pattern["kind"]](**pattern)
+    way = _pattern(log)
     if isinstance(way, patterns.Weave | patterns.Circle):
         return {"finished": bool((mission["phase"] == 2).any()), "waypoints": 0, "cross_track_rms": None}
     points = patterns.points(way)
@@ -44,3 +50,20 @@ def track_metrics(log: VehicleLog) -> dict[str, Any]:
         "waypoints": reached,
         "cross_track_rms": float(np.sqrt(all_squares.mean())) if len(all_squares) else None,
     }
+
+
+def _pattern(log: VehicleLog) -> patterns.Waypoints | patterns.LawnMower | patterns.Law:
+    """The track that a log says its vehicle had.
+
+    Raises:
+        InputError: it does not, or what it says cannot be read.
+    """
+    if "mission_settings" not in log.attributes:
+        raise InputError(f"the log of '{log.name}' lacks 'mission_settings', which says what its track is")
+    where = f"log, mission_settings of '{log.name}'"
+    found = yaml_text.read(str(log.attributes["mission_settings"]), where).value
+    values = {"pattern": found.get("pattern") if isinstance(found, Mapping) else None}
+    try:
+        return _Settings.model_validate_json(json.dumps(values, default=str), strict=True).pattern
+    except ValidationError as error:
+        raise schema.explain(error, _Settings, values, {"": where}) from None

@@ -58,7 +58,6 @@ Pattern = Annotated[
     | Annotated[Circle, Tag("Circle")],
     Discriminator(tag_by_kind(Waypoints, LawnMower, Weave, Circle)),
 ]
-KINDS: dict[str, type[Settings]] = {"waypoints": Waypoints, "lawn_mower": LawnMower, "weave": Weave, "circle": Circle}
 
 
 def heading(pattern: Law, time: float, speed: float) -> float:

@@ -1,8 +1,7 @@
 """What the study of paper 1 leaves: tables as CSV, and pictures."""
 
-import csv
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,15 +9,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from auvsim.analysis.style import BAND, dress, legend
-from auvsim.base.errors import InputError
-from auvsim.base.files import whole
+from auvsim.analysis.style import BAND, dress
 from auvsim.reproduce.paired import REFERENCE
 from auvsim.reproduce.paper1.acceptance import PAPER_MEANS, PAPER_VARIANCES, verdicts
 from auvsim.reproduce.paper1.planar import CURVES, SETTLED, Curves, Study
 from auvsim.reproduce.paper1.study import FILTERS, ROWS, Result
+from auvsim.reproduce.products import finish, verdict_rows, write_files
 
-DPI = 110
 COLOURS = {"regular_best": "#d62728", "paper": "#1f77b4", "imm_biases": "#2c7a2c"}
 LABELS = {
     "regular_best": "regular EKF, its best noise",
@@ -50,29 +47,6 @@ def write(study: Study, folder: Path) -> list[Path]:
     )
 
 
-def write_files(
-    folder: Path, tables: Mapping[str, Iterable[Sequence[Any]]], figures: Mapping[str, Figure]
-) -> list[Path]:
-    """Writes tables as CSV and figures as PNG, by their names.
-
-    Raises:
-        InputError: If one of them cannot be written.
-    """
-    path = folder
-    try:
-        for name, rows in tables.items():
-            path = folder / name
-            with whole(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-                csv.writer(file, lineterminator="\n").writerows([_text(value) for value in row] for row in rows)
-        for name, figure in figures.items():
-            path = folder / name
-            with whole(path) as partial:
-                figure.savefig(partial, dpi=DPI, format="png")
-    except OSError as error:
-        raise InputError(f"{path}: cannot be written: {error.strerror}") from error
-    return [folder / name for name in (*tables, *figures)]
-
-
 def study_rows(study: Study) -> Iterable[Sequence[Any]]:
     """Heading and lines of study.csv: one for each row and filter."""
     yield (
@@ -92,9 +66,7 @@ def study_rows(study: Study) -> Iterable[Sequence[Any]]:
 
 def acceptance_rows(study: Study) -> Iterable[Sequence[Any]]:
     """Heading and lines of acceptance.csv: one for each thing to reach."""
-    yield "row", "quantity", "measured", "low", "high", "met", "reason"
-    for v in verdicts(study):
-        yield v.row, v.quantity, v.measured, v.low, v.high, "yes" if v.met else "no", v.reason
+    return verdict_rows(verdicts(study))
 
 
 def table1_rows(study: Study) -> Iterable[Sequence[Any]]:
@@ -115,12 +87,6 @@ def interval(result: Result) -> tuple[float, float]:
 def claimed_nees(key: str, result: Result) -> float:
     """NEES of a filter whose covariance is meant to hold its whole error; NaN for those that leave the current out."""
     return result.nees if key in ("augmented", "augmented_constant", "unscented", "imm", "imm_biases") else math.nan
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, float):
-        return f"{value:.6g}" if math.isfinite(value) else ("" if math.isnan(value) else str(value))
-    return str(value)
 
 
 def figure6(study: Study) -> Figure:
@@ -195,13 +161,3 @@ def _rms(curves: Curves, key: str) -> np.ndarray:
 
 def _mark_turn(axes: Axes) -> None:
     axes.axvspan(*TURN, facecolor=BAND, lw=0.0, zorder=0)
-
-
-def finish(figure: Figure, axes: Any, title: str) -> None:
-    """Title, and one legend for all axes."""
-    entries: dict[str, Any] = {}
-    for each in np.atleast_1d(axes):
-        handles, labels = each.get_legend_handles_labels()
-        entries |= dict(zip(labels, handles, strict=True))
-    legend(figure, entries)
-    figure.suptitle(title, fontsize=13)

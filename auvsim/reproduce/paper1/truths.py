@@ -14,8 +14,9 @@ from auvsim.reproduce.paper1 import mujoco as paper1_mujoco
 from auvsim.reproduce.paper1 import study as paper1_study
 from auvsim.reproduce.paper1.mujoco import MujocoStudy
 from auvsim.reproduce.paper1.planar import Study
-from auvsim.reproduce.paper1.products import DOTS, claimed_nees, finish, interval, write_files
+from auvsim.reproduce.paper1.products import DOTS, claimed_nees, interval
 from auvsim.reproduce.paper1.study import FILTERS, Result
+from auvsim.reproduce.products import finish, write_files
 
 Results = Mapping[str, Result]  # by filter
 DRAWN = ("augmented", "imm_biases")

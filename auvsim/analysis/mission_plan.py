@@ -1,0 +1,243 @@
+"""What a scenario plans, without dynamics: the ways of its vehicles, what each ranges to, and errors of its sensors."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from auvsim.acoustics.payload import NUMBERS, STATE, packet_bits
+from auvsim.base.errors import InputError
+from auvsim.base.frames import Array
+from auvsim.missions.mission import MissionSetup, Situation
+from auvsim.missions.track.mission import Track
+from auvsim.navigation.estimate import Estimate
+from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.range import RangeSettings
+from auvsim.simulation.scenario import Scenario, VehicleSettings
+from auvsim.simulation.sensor_settings import on_board
+from auvsim.vehicles import library
+from auvsim.water.currents import CurrentField
+from estimators.core.models.odometry import SPACE, OdometryNoise
+from estimators.docking.usbl import UsblModel
+
+STEP = 1.0  # of planned ways [s]
+FADES = np.polynomial.hermite_e.hermegauss(9)  # nodes and weights of a normal variable
+BEGIN, CURRENT = 3.0, 0.5  # error of the start [m] and of the current [m/s] along each axis, where nothing says it
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Way:
+    """A planned way, at every STEP."""
+
+    places: Array  # (k + 1, 2) north, east [m]
+    depths: Array  # (k + 1,) [m]
+    inputs: Array  # (k, 3) speed ahead and to starboard through the water [m/s], heading [rad]
+
+    def at(self, times: Array) -> Array:
+        """North, east, depth (t, 3) at times [s]."""
+        known = STEP * np.arange(len(self.places))
+        columns = (*self.places.T, self.depths)
+        return np.stack([np.interp(times, known, column) for column in columns], axis=-1)
+
+
+Deviation = Callable[[Array], Array]  # distance [m] -> variance, that of one that is heard over how often that is
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Source:
+    """What a vehicle ranges to."""
+
+    name: str
+    times: Array  # (k,) of ranges [s]
+    places: Array  # (k, 3) north, east, depth then [m]
+    range_variance: Deviation  # [m^2]
+    bearing_variance: Deviation | None  # [rad^2]; None: it measures none
+    by_compass: bool  # whether bearings are by the vehicle's compass
+    delay: float  # from then to when it is known [s]
+    errors: Mapping[str, float]  # deviations of states of `core.models.odometry` that it brings
+
+
+class Odometry(NamedTuple):
+    """What a vehicle knows by itself."""
+
+    noise: OdometryNoise
+    deviations: Mapping[str, float]  # of states of `core.models.odometry` at the start
+    walks: Array  # (9,) densities of random walks of the states
+
+
+def way(scenario: Scenario, name: str, field: CurrentField) -> Way:
+    """The way of a vehicle on its track, that heads at once where its mission asks and knows where it is.
+
+    Raises:
+        InputError: It has a mission of another kind.
+    """
+    vehicle = scenario.vehicles[name]
+    if getattr(vehicle.mission, "kind", "") != "track":
+        kind = getattr(vehicle.mission, "kind", "one of its own")
+        raise InputError(f"vehicles.{name}.mission: a bound needs a track, whose way is known before; not {kind}")
+    north, east, depth = scenario.start_position(name)
+    heading, start = math.radians(vehicle.start.heading_deg), np.array((north, east))
+    setup = MissionSetup(
+        name=name, settings=vehicle.mission, vehicle=library.vehicle(vehicle.model), heading=heading, depth=depth,
+        period=STEP, holds=lambda speed: True, structures={},
+    )  # fmt: skip
+    mission, place, speed = Track(setup), start, vehicle.start.speed
+    places, depths, inputs = [place], [depth], []
+    for k in range(math.ceil(scenario.duration / STEP)):
+        water = field.evaluate(k * STEP, np.array((*place, depth))).velocity[:2]
+        now = Estimate(
+            time=k * STEP, position=np.array((*place, depth)), heading=heading,
+            velocity=np.array((speed, 0.0, 0.0)), current=water, covariance=np.zeros((8, 8)), initialised=True,
+        )  # fmt: skip
+        asked = mission.update(Situation(k * STEP, now, heading, depth, None, (), ()))
+        heading, depth, speed = asked.heading, asked.depth, asked.speed
+        place = place + STEP * (speed * np.array((math.cos(heading), math.sin(heading))) + water)
+        places.append(place)
+        depths.append(depth)
+        inputs.append((speed, 0.0, heading))
+    return Way(places=np.array(places), depths=np.array(depths), inputs=np.array(inputs))
+
+
+def odometry(scenario: Scenario, name: str, own: Way, steady: bool) -> Odometry:
+    """Noise and constant errors of a vehicle's DVL and compass, and how well its estimator knows start and current.
+
+    A constant error of the DVL's velocity is one of its scale and of its mounting, at the planned speed.
+
+    Args:
+        scenario: Every number definite.
+        name: Of the vehicle.
+        own: Its way.
+        steady: Whether the current is the same everywhere and always; else it walks as the estimator assumes.
+
+    Raises:
+        InputError: It has no DVL.
+    """
+    vehicle = scenario.vehicles[name]
+    dvl, compass, estimator = vehicle.sensors.dvl, vehicle.sensors.compass, vehicle.estimator
+    if not dvl.enabled:
+        raise InputError(
+            f"vehicles.{name}.sensors.dvl.enabled: a bound needs a DVL, by which the vehicle reckons; true"
+        )
+    forward, starboard, _ = dvl.water_noise
+    position = float(getattr(estimator, "position", BEGIN))
+    current = float(getattr(estimator, "current", CURRENT))
+    noise = OdometryNoise(
+        forward=forward**2 / dvl.rate,
+        starboard=starboard**2 / dvl.rate,
+        heading=math.radians(compass.heading_noise_deg) ** 2 / compass.rate,
+    )
+    constant = dvl.bias / max(0.1, float(own.inputs[:, 0].mean()))
+    mounting = math.radians(math.hypot(compass.heading_bias_deg, dvl.misalignment_deg))
+    deviations = {
+        "north": position, "east": position, "current_north": current, "current_east": current,
+        "speed_scale": math.hypot(dvl.scale_error, constant), "compass_bias": math.hypot(mounting, constant),
+    }  # fmt: skip
+    walk = 0.0 if steady else float(getattr(estimator, "current_noise", 0.0))
+    return Odometry(noise, deviations, SPACE.vector({"current_north": walk, "current_east": walk}))
+
+
+def sources(scenario: Scenario, name: str, ways: Mapping[str, Way]) -> list[Source]:
+    """What a vehicle ranges to: vehicles that tell where they are, or that it asks; beacons; the dock's USBL."""
+    vehicle = scenario.vehicles[name]
+    found = [s for other in ways if other != name and (s := _vehicle(scenario, name, other, ways[other])) is not None]
+    for sensor, settings in on_board(vehicle.sensors):
+        if isinstance(settings, RangeSettings):
+            found.append(_beacon(scenario, sensor, settings))
+    dock = vehicle.sensors.usbl.dock or scenario.dock_of(name)
+    if vehicle.sensors.usbl.enabled and dock in scenario.structures:
+        found.append(_dock(scenario, vehicle, dock))
+    return found
+
+
+def is_fixed(vehicle: VehicleSettings) -> bool:
+    """Whether a vehicle has its position from elsewhere, so that there is nothing to bound."""
+    return any(isinstance(settings, FixSettings) for _, settings in on_board(vehicle.sensors))
+
+
+def _vehicle(scenario: Scenario, name: str, other: str, way: Way) -> Source | None:
+    """Another vehicle that is heard, by one-way or two-way travel time."""
+    own, its = scenario.vehicles[name].modem, scenario.vehicles[other].modem
+    if own is None or its is None or not own.modem.hears(its.modem):
+        return None
+    if own.ask.whom == other:
+        period, phase, delay = own.ask.period, own.ask.phase + own.turn_around, 0.0
+    elif own.one_way and its.tell.period is not None:
+        period, phase, delay = its.tell.period, its.tell.phase, its.tell.delay
+    else:
+        return None
+    network, sender, receiver = scenario.network, its.modem, own.modem
+    bits = packet_bits(NUMBERS[STATE])
+    times = np.arange(phase, scenario.duration, period)
+    timing = (own.sound_speed * receiver.timing_noise) ** 2 + told_density(scenario.vehicles[other]) / period
+
+    def heard(distance: Array) -> Array:
+        nodes, weights = FADES
+        noise = network.noise_in(receiver)
+        levels = np.array([network.received_level(sender, d) for d in np.ravel(distance)])[:, None] - noise
+        snr = levels + network.fading * nodes
+        per_bit = 10.0 ** ((snr + sender.coding_gain) / 10.0) * sender.bandwidth / sender.bit_rate
+        good = np.exp(bits * np.log1p(-0.5 * np.exp(-0.5 * per_bit))) @ (weights / weights.sum())
+        share = (1.0 - network.dropout_probability) * np.maximum(good, 1e-12)
+        return share.reshape(np.shape(distance))
+
+    def bearing(distance: Array) -> Array:
+        return math.radians(receiver.bearing_noise_deg or 0.0) ** 2 / heard(distance)
+
+    clocks = scenario.vehicles[other].clock, scenario.vehicles[name].clock
+    two_way = own.ask.whom == other
+    errors = {
+        "range_offset": 0.0 if two_way else own.sound_speed * abs(clocks[0].offset - clocks[1].offset),
+        "range_drift": 0.0 if two_way else own.sound_speed * 1e-6 * abs(clocks[0].drift_ppm - clocks[1].drift_ppm),
+        "range_scale": abs(own.sound_speed / network.sound_speed - 1.0),
+    }
+    return Source(
+        name=other, times=times, places=way.at(times), range_variance=lambda distance: timing / heard(distance),
+        bearing_variance=None if receiver.bearing_noise_deg is None else bearing, by_compass=True,
+        delay=delay + receiver.processing + sender.duration(bits),
+        errors=errors,
+    )  # fmt: skip
+
+
+def told_density(vehicle: VehicleSettings) -> float:
+    """Density of a leader's own position error [m^2 s], along each axis: that of its fixes, which its filter follows.
+
+    A filter shapes the error of its fixes in time, but leaves its density at low frequencies as it is; 0 without fixes.
+    """
+    fixes = [s for _, s in on_board(vehicle.sensors) if isinstance(s, FixSettings)]
+    return 1.0 / sum(s.rate * (1.0 - s.dropout_probability) / s.noise**2 for s in fixes) if fixes else 0.0
+
+
+def _beacon(scenario: Scenario, sensor: str, s: RangeSettings) -> Source:
+    times = np.arange(1.0 / s.rate, scenario.duration, 1.0 / s.rate)
+
+    def variance(distance: Array) -> Array:
+        return np.where(distance <= s.maximum, s.noise**2 / max(1.0 - s.dropout_probability, 1e-12), np.inf)
+
+    return Source(
+        name=sensor, times=times, places=np.tile(np.array(s.beacon), (len(times), 1)), range_variance=variance,
+        bearing_variance=None, by_compass=True, delay=0.0,
+        errors={"range_offset": s.bias, "range_scale": s.scale_error},
+    )  # fmt: skip
+
+
+def _dock(scenario: Scenario, vehicle: VehicleSettings, dock: str) -> Source:
+    """The dock's USBL, whose fix is a range and a bearing by the dock's compass."""
+    usbl, link, pose = vehicle.sensors.usbl, scenario.network.acoustics, scenario.structures[dock].pose
+    ranges, deviations = zip(*usbl.noise, strict=True)
+    model = UsblModel(ranges=ranges, deviations=tuple(max(1e-6, usbl.noise_scale * d) for d in deviations))
+    times = np.arange(usbl.interval, scenario.duration, usbl.interval)
+    reach = usbl.maximum_range or math.inf
+
+    def square(distance: Array) -> Array:
+        deviation = np.vectorize(model.deviation)(distance)
+        return np.where(distance <= reach, deviation**2 / max(1.0 - link.dropout_probability, 1e-12), np.inf)
+
+    def bearing(distance: Array) -> Array:
+        return square(distance) / np.maximum(distance, 1.0) ** 2 + math.radians(usbl.dock_heading_bias_deg) ** 2
+
+    return Source(
+        name=dock, times=times, places=np.tile(pose.position, (len(times), 1)), range_variance=square,
+        bearing_variance=bearing, by_compass=False, delay=link.delay, errors={},
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""Adapter of paper 2's estimators to the contract of a run: a follower in an unknown current, by ranges to a leader."""
+
+import math
+from collections.abc import Mapping, Sequence
+from operator import attrgetter
+from typing import Any
+
+import numpy as np
+
+from auvsim.acoustics.message import Delivery
+from auvsim.base.frames import wrap
+from auvsim.base.reading import Reading
+from auvsim.navigation.estimate import Estimate
+from auvsim.navigation.heard import Listener, Sight
+from auvsim.navigation.measurements import of_kind
+from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.odometry import UNKNOWN, Odometry, planned_start, required
+from auvsim.sensors.compass import CompassSettings
+from auvsim.sensors.dvl import DvlSettings
+from estimators.core.history import History
+from estimators.core.models.odometry import SPACE, OdometryNoise
+from estimators.core.types import Gaussian
+from estimators.motion_radius.bank import BankFilter
+from estimators.motion_radius.ranges import leader_range
+
+
+class MotionRadiusNavigator:
+    """Paper 2's problem, by the bank of filters: an unknown current, by ranges to a leader; see `estimators`.
+
+    Odometry is a DVL's water track and the compass.
+    """
+
+    states: Mapping[str, str] = SPACE.units
+
+    def __init__(self, setup: NavigatorSetup) -> None:
+        dvls = [*of_kind(setup.sensors, DvlSettings).values()]
+        required(setup, ("a DVL (sensors.dvl.enabled: true)", bool(dvls)))
+        s, modem = setup.settings, setup.modem
+        assert modem is not None
+        self._setup, self._modem = setup, modem
+        dvl, compass = dvls[0], setup.sensors.get("compass")
+        known = isinstance(compass, CompassSettings)
+        white = math.radians(compass.heading_noise_deg) ** 2 / compass.rate if known else 0.0
+        noise = OdometryNoise(
+            forward=dvl.water_noise[0] ** 2 / dvl.rate, starboard=dvl.water_noise[1] ** 2 / dvl.rate, heading=white,
+            position=s.position_noise,
+        )  # fmt: skip
+        speed = modem.sound_speed
+        deviations = {
+            "north": s.position, "east": s.position, "current_north": s.current, "current_east": s.current,
+            "range_offset": speed * s.clock_offset, "range_drift": speed * 1e-6 * s.clock_drift_ppm,
+            "range_scale": s.sound_speed_error, "speed_scale": dvl.scale_error,
+            "compass_bias": math.radians(compass.heading_bias_deg) if known else UNKNOWN,
+        }  # fmt: skip
+        north, east = planned_start(setup)
+        walks = SPACE.vector({"current_north": s.current_noise, "current_east": s.current_noise})
+        self._filter = BankFilter(
+            SPACE.belief({"north": north, "east": east}, deviations), noise, walks=walks, gate=0.9999
+        )
+        self._range_sd = math.hypot(s.range_noise, speed * modem.modem.timing_noise)
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        self._history: History[Any] = History(
+            self._filter, step=self._setup.period, keep=30.0, verdicts=attrgetter("verdicts")
+        )
+        self._odometry, self._listener = Odometry(self._setup, slice(3, 6)), Listener(self._modem)
+        self._place: tuple[float, float] = planned_start(self._setup)
+
+    def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
+        """See `Navigator.update`."""
+        odometry, history = self._odometry, self._history
+        odometry.update(time, readings)
+        state = None
+        if odometry.heading is not None:
+            history.append(time, (odometry.forward, odometry.starboard, odometry.heading))
+            for sight in self._listener.sights(messages):
+                if sight.range is not None:
+                    history.insert(self._measured(sight))
+            state = history.replay()
+        n = len(SPACE)
+        belief = state.belief if state is not None else Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
+        mean = belief.mean
+        if state is not None:
+            self._place = float(mean[0]), float(mean[1])
+        bias = float(mean[8])
+        return Estimate(
+            time=time,
+            position=np.array((mean[0], mean[1], odometry.depth.at(time) or 0.0)),
+            heading=wrap((odometry.heading or 0.0) - bias),
+            velocity=np.array((odometry.forward, odometry.starboard, odometry.yaw_rate)),
+            current=mean[2:4],
+            covariance=belief.covariance,
+            initialised=state is not None,
+            mean=mean,
+            refused=sum(history.refused.values()),
+            reasons=dict(history.refused),
+            reinitialised=history.reinitialised,
+            outcomes=history.outcomes,
+        )
+
+    def _measured(self, sight: Sight) -> Any:
+        assert sight.range is not None
+        report, own = sight.report, self._odometry.depth.value or 0.0
+        return leader_range(
+            sight.range, (report.north, report.east, report.depth - self._modem.transducer[2]),
+            deviation=self._range_sd, stamp=sight.stamp, received=sight.received, depth=own,
+            leader_deviation=math.sqrt(sight.variance_along(*self._place)), sequence=sight.sequence,
+            source=sight.source,
+        )  # fmt: skip
+
+
+def motion_radius(setup: NavigatorSetup) -> Navigator:
+    """The bank of filters for an unknown current, by ranges to a leader (paper 2)."""
+    return MotionRadiusNavigator(setup)

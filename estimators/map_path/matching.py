@@ -1,0 +1,97 @@
+"""Where a frame lies relative to earlier ones: the best pose near a predicted one, and its covariance."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.core.types import Array
+from estimators.map_path.likelihood import Matcher, Prepared
+from estimators.map_path.poses import compose
+
+LEAST_CELLS = 100  # shared with an earlier frame, fewer and the two are not compared
+NO_OVERLAP, NO_PEAK = "no_overlap", "no_peak"  # why a frame cannot be placed
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Search:
+    """The poses that are tried about a predicted one; finer than the point spread, the rest is a quadratic's."""
+
+    steps: tuple[float, float, float] = (0.25, 0.25, np.radians(1.0))  # forward, starboard [m], turn [rad]
+    reach: float = 3.0  # of the search, in standard deviations of the prediction
+    limits: tuple[float, float, float] = (1.0, 1.0, np.radians(5.0))  # of the search at most
+    fine: tuple[float, float, float] = (0.12, 0.12, np.radians(0.6))  # spacing of the points of the quadratic
+
+
+class Match(NamedTuple):
+    """The pose of a frame relative to the predicted one."""
+
+    offset: Array  # (3,) forward, starboard [m], turn [rad] from the predicted pose
+    covariance: Array  # (3, 3) of the match alone, without the prediction
+    log_likelihood: float  # of the match against that of no relation at all
+    weights: Array  # (k,) share of each earlier frame; 0 of those that overlap too little
+
+
+def match(
+    matcher: Matcher, later: Prepared, earlier: Sequence[Prepared], relatives: Array, prior: Array, search: Search
+) -> Match | str:
+    """The most probable pose near the predicted one; or why there is none, `no_overlap` or `no_peak`.
+
+    Args:
+        matcher: Compares two frames.
+        later: The frame to be placed.
+        earlier: Frames (k of them) that are in place.
+        relatives: Its predicted pose (k, 3) relative to each of them.
+        prior: Covariance (3, 3) of the predicted pose, in the later frame's axes.
+        search: What to try.
+    """
+    cells = [matcher.shared_cells(relative) for relative in relatives]
+    counts = np.array([np.count_nonzero(shared) for shared in cells])
+    used = np.flatnonzero(counts >= LEAST_CELLS).tolist()
+    if not used:
+        return NO_OVERLAP
+
+    def likelihood(offsets: Array) -> Array:
+        each = [matcher.log_likelihood(later, earlier[k], compose(relatives[k], offsets), cells[k]) for k in used]
+        return np.sum(each, axis=0)
+
+    information = np.linalg.inv(prior)
+    offsets = _lattice(prior, search)
+    posterior = likelihood(offsets) - 0.5 * np.einsum("ni,ij,nj->n", offsets, information, offsets)
+    centre = offsets[int(np.argmax(posterior))]
+    for _ in range(2):
+        value, gradient, curvature = _quadratic(likelihood(centre + _POINTS * search.fine), np.array(search.fine))
+        if np.linalg.eigvalsh(curvature)[0] <= 0.0:
+            return NO_PEAK
+        best = np.linalg.solve(curvature + information, gradient + curvature @ centre)
+        if np.any(np.abs(best - centre) > 3.0 * np.array(search.fine)):
+            return NO_PEAK
+        peak, centre = centre + np.linalg.solve(curvature, gradient), best
+    weights = np.where(counts >= LEAST_CELLS, counts, 0) / counts[used].sum()
+    return Match(peak, np.asarray(np.linalg.inv(curvature), dtype=np.float64), float(value), weights)
+
+
+def _lattice(prior: Array, search: Search) -> Array:
+    axes = []
+    for deviation, step, limit in zip(np.sqrt(np.diagonal(prior)), search.steps, search.limits, strict=True):
+        count = max(1, int(np.ceil(min(search.reach * deviation, limit) / step)))
+        axes.append(step * np.arange(-count, count + 1))
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=3).reshape(-1, 3)
+
+
+_POINTS = np.stack(np.meshgrid(*[np.array([-1.0, 0.0, 1.0])] * 3, indexing="ij"), axis=3).reshape(-1, 3)
+_PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+_FIT = np.linalg.pinv(
+    np.column_stack((np.ones(27), _POINTS, *(_POINTS[:, i] * _POINTS[:, j] for i, j in _PAIRS)))
+)  # coefficients of the quadratic of least squares through the 27 points
+
+
+def _quadratic(values: Array, spacing: Array) -> tuple[float, Array, Array]:
+    """Value, gradient (3,) and negative Hessian (3, 3) at the middle of the 27 points."""
+    coefficients = _FIT @ values
+    curvature = np.zeros((3, 3))
+    for (i, j), c in zip(_PAIRS, coefficients[4:], strict=True):
+        curvature[i, j] -= c
+        curvature[j, i] -= c
+    return coefficients[0], coefficients[1:4] / spacing, curvature / np.outer(spacing, spacing)

@@ -1,0 +1,200 @@
+"""A bank of extended Kalman filters against mirror solutions: each starts from a current of its own, ranges decide.
+
+Each range is used once; its variance holds that of the leader's place. The states are those of
+`core.models.odometry`: give a deviation at the start to what is to be estimated, clock, sound speed, speed log and
+compass included; what has none is taken as right.
+"""
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from estimators.core import imm, loops
+from estimators.core.compiling import compiled
+from estimators.core.consistency import chi_square
+from estimators.core.errors import NotFiniteError, ParameterError
+from estimators.core.filter import OUTLIER
+from estimators.core.history import Input, Node
+from estimators.core.models.odometry import SPACE, Displacement, N, OdometryNoise, move, show_range, spread
+from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdicts
+from estimators.motion_radius.geometry import Geometry
+from estimators.motion_radius.ranges import KIND
+
+SAME = 0.05  # squared normalised distance below which two filters have come to the same solution
+IMPROBABLE = 1e-6  # probability below which a filter is given up
+BREADTH = 1.135  # variance of the normal density that weighs 7 currents a side so that their mixture has the start's
+REACH, WIDTH = 1.8, 0.36  # outermost currents of the bank and deviation of each, in deviations of the start's current
+
+
+class BankState(NamedTuple):
+    """What a node keeps: each filter's belief at the last range, and the displacement since."""
+
+    means: Array  # (m, 9)
+    covariances: Array  # (m, 9, 9)
+    weights: Array  # (m,) probabilities
+    q: Array  # (9,) densities of random walks of the states [unit^2/s]
+    since: Displacement = Displacement()
+    accepted: int = 0  # ranges so far
+    geometry: Geometry = Geometry()
+    verdicts: Verdicts = ()
+
+    @property
+    def modes(self) -> tuple[Array, Array]:
+        """Means (m, 9) and covariances (m, 9, 9), predicted from the last range to now."""
+        return predict_modes(self.means, self.covariances, self.since, self.q)
+
+    @property
+    def belief(self) -> Gaussian:
+        """The filters' beliefs merged, now."""
+        means, covariances = self.modes
+        mean, covariance = loops.merge(means, covariances, self.weights, np.zeros(0, dtype=np.int64))
+        return Gaussian(mean=mean, covariance=covariance)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """Why position and current may be wrong by more than their covariance says; empty if nothing is suspected."""
+        means, covariances = self.modes
+        return self.geometry.warnings(means, covariances, self.weights)
+
+
+class BankFilter:
+    """Gaussian sum filter over the current, for a `History`; inputs: forward, starboard speed [m/s] and heading [rad].
+
+    Args:
+        start: Belief at the first node, of the states of `core.models.odometry.SPACE`.
+        noise: Of the odometry.
+        side: Currents of the bank along each axis; 1 is a plain extended Kalman filter.
+        pruned: After how many ranges, each time, filters that have come to the same solution become one, and those no
+            longer probable are given up.
+        walks: Densities (9,) of random walks of the states [unit^2/s]; None: all are constant.
+        gate: Probability with which a range that fits is accepted by the filter that it fits best; None accepts all.
+
+    Raises:
+        ParameterError: The start has other states, or the bank has no filter.
+    """
+
+    def __init__(
+        self,
+        start: Gaussian,
+        noise: OdometryNoise,
+        *,
+        side: int = 7,
+        pruned: int = 30,
+        walks: Array | None = None,
+        gate: float | None = None,
+    ) -> None:
+        if start.mean.shape != (N,) or side < 1:
+            raise ParameterError(
+                f"start of {start.mean.size} states and {side} currents a side; there must be {N} states, "
+                f"{', '.join(SPACE.names)}, and 1 current or more"
+            )
+        self._means, self._covariances, self._weights = spread_over_currents(start, side)
+        self._noise, self._pruned = noise, pruned
+        self._q = np.zeros(N) if walks is None else np.array(walks, dtype=float)
+        self._limit = math.inf if gate is None else chi_square(gate, 1)
+
+    def start(self, nodes: Sequence[Node[BankState]], index: int) -> BankState:
+        """State at the first node, with its measurements."""
+        state = BankState(self._means, self._covariances, self._weights, self._q)
+        return self.correct(state, nodes[index].time, nodes[index].measurements)
+
+    def predict(self, state: BankState, u: Input, duration: float) -> BankState:
+        """State after `duration` [s]."""
+        since = state.since.extended(u[0], u[1], u[2], duration, self._noise)
+        return state._replace(since=since, verdicts=())
+
+    def correct(self, state: BankState, node_time: float, measurements: Sequence[Measurement]) -> BankState:
+        """State after a node's measurements.
+
+        Raises:
+            NotFiniteError: The correction is not finite.
+        """
+        for m in measurements:
+            if m.kind != KIND:
+                state = state._replace(verdicts=(*state.verdicts, (m, NO_MODEL, math.nan)))
+                continue
+            state = self._ranged(state, m)
+        return state
+
+    def _ranged(self, state: BankState, m: Measurement) -> BankState:
+        north, east, depth, own = m.parameters
+        predicted = predict_modes(state.means, state.covariances, state.since, state.q)
+        distance, variance = float(m.value[0]), float(m.covariance[0, 0])
+        means, covariances, logs, nis = correct_modes(*predicted, distance, variance, north, east, depth - own)
+        best = float(nis[state.weights > 1e-6].min())
+        if best > self._limit:
+            return state._replace(verdicts=(*state.verdicts, (m, OUTLIER, best)))
+        if not (np.isfinite(logs).all() and np.isfinite(means).all()):
+            raise NotFiniteError(f"correction by the range {distance} m at {m.stamp} s is not finite")
+        weights, accepted = imm.update(state.weights, logs), state.accepted + 1
+        verdict = (m, "", float(nis[weights.argmax()]))
+        if accepted % self._pruned == 0 and len(weights) > 1:
+            means, covariances, weights = pruned(means, covariances, weights)
+        geometry = state.geometry.extended(state.since, north, east, distance, variance)
+        return BankState(
+            means, covariances, weights, state.q, Displacement(), accepted, geometry, (*state.verdicts, verdict)
+        )
+
+
+def spread_over_currents(start: Gaussian, side: int) -> tuple[Array, Array, Array]:
+    """Means (m, 9), covariances (m, 9, 9) and weights (m,) of `side` squared filters over the start's current."""
+    if side == 1:
+        return start.mean[None].copy(), start.covariance[None].copy(), np.ones(1)
+    deviations = np.sqrt(np.diagonal(start.covariance)[2:4])
+    steps = np.linspace(-REACH, REACH, side)
+    grid = np.stack(np.meshgrid(steps, steps, indexing="ij"), axis=-1).reshape(-1, 2)
+    means = np.repeat(start.mean[None], len(grid), axis=0)
+    means[:, 2:4] += grid * deviations
+    shrink = np.ones(N)
+    shrink[2:4] = WIDTH
+    covariances = np.repeat((start.covariance * np.outer(shrink, shrink))[None], len(grid), axis=0)
+    weights = np.exp(-0.5 * np.sum(grid**2, axis=1) / BREADTH)
+    return means, covariances, weights / weights.sum()
+
+
+def pruned(means: Array, covariances: Array, weights: Array) -> tuple[Array, Array, Array]:
+    """The filters that differ, the most probable first, each with the probability of those that are like it."""
+    order = np.argsort(-weights, kind="stable")
+    kept: list[int] = []
+    total = np.zeros(len(weights))
+    for k in order[weights[order] > IMPROBABLE].tolist():
+        like = next((j for j in kept if _squared_distance(means[k] - means[j], covariances[j]) < SAME), k)
+        total[like] += weights[k]
+        if like == k:
+            kept.append(k)
+    return means[kept], covariances[kept], total[kept] / total[kept].sum()
+
+
+def _squared_distance(error: Array, covariance: Array) -> float:
+    """Of position and current, which make up all that the filters of a bank differ in at first."""
+    e = error[:4]
+    return float(e @ np.linalg.solve(covariance[:4, :4], e))
+
+
+@compiled
+def predict_modes(means, covariances, d, q):
+    """Means (m, 9) and covariances (m, 9, 9) after a displacement."""
+    x, P = np.empty_like(means), covariances.copy()
+    if d[0] <= 0.0:
+        x[:] = means
+        return x, P
+    F, work = np.eye(means.shape[1]), np.empty(P.shape[1:])
+    for k in range(len(means)):
+        move(means[k], d, x[k], F)
+        spread(P[k], F, d, q, work)
+    return x, P
+
+
+@compiled
+def correct_modes(means, covariances, distance, variance, north, east, down):
+    """Means (m, 9), covariances (m, 9, 9), log likelihoods (m,) and NIS (m,) after a range."""
+    m, n = means.shape
+    x, P, logs, nis = np.empty_like(means), np.empty_like(covariances), np.empty(m), np.empty(m)
+    H, R, residual = np.empty((1, n)), np.array([[variance]]), np.empty(1)
+    for k in range(m):
+        residual[0] = distance - show_range(means[k], north, east, down, H)
+        x[k], P[k], _, S, nis[k], _ = loops.correct(means[k], covariances[k], H, residual, R, math.inf)
+        logs[k] = -0.5 * (nis[k] + math.log(2.0 * math.pi * S[0, 0]))
+    return x, P, logs, nis

@@ -1,0 +1,159 @@
+"""The pose graph against closed forms and an independent solver, and closures that are wrong."""
+
+import math
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from auvsim.reproduce.paper5.methods import START, follow, frame_model
+from auvsim.reproduce.paper5.scenes import GRID, Conditions, simulate
+from estimators.core.errors import ParameterError
+from estimators.core.types import Gaussian
+from estimators.map_path import pose_graph
+from estimators.map_path.closures import consistent, largest_clique
+from estimators.map_path.graph import Edge, optimise
+from estimators.map_path.likelihood import Matcher
+from estimators.map_path.poses import Input, between, compose, wrapped
+from estimators.map_path.window import WindowFilter
+
+PRIOR = np.diag([1e-4, 1e-4, 1e-6])
+
+
+def loop(rng, count=12, noise=(0.05, 0.03, 0.02)):
+    """True poses on a lopsided loop, and noisy edges along it and across."""
+    turns = np.linspace(0.0, 1.7 * math.pi, count)
+    truth = np.column_stack((9.0 * np.cos(turns), 6.0 * np.sin(turns), turns + math.pi / 2))
+    truth[:, 2] = wrapped(truth[:, 2])
+    pairs = [(k, k + 1) for k in range(count - 1)] + [(0, 7), (2, count - 1), (1, 5)]
+    covariance = np.diag(np.square(noise)) + 2e-4
+    edges = [
+        Edge(i, j, between(truth[i], truth[j]) + rng.multivariate_normal(np.zeros(3), covariance), covariance)
+        for i, j in pairs
+    ]
+    return truth, edges
+
+
+def test_the_solution_is_that_of_another_solver():
+    """Least squares of scipy on residuals written anew, with a fix of the position besides."""
+    truth, edges = loop(np.random.default_rng(1))
+    fixes = [(9, truth[9, :2] + (0.3, -0.2), np.array([[0.5, 0.1], [0.1, 0.3]]))]
+    found = optimise(truth, edges, PRIOR, huber=None, fixes=fixes, tolerance=1e-10)
+
+    def residuals(flat):
+        poses = flat.reshape(-1, 3)
+        out = [np.linalg.solve(np.linalg.cholesky(PRIOR), poses[0] - truth[0])]
+        for i, j, relative, covariance in edges:
+            c, s = math.cos(poses[i, 2]), math.sin(poses[i, 2])
+            d = poses[j] - poses[i]
+            error = np.array([c * d[0] + s * d[1], -s * d[0] + c * d[1], d[2]]) - relative
+            error[2] = math.remainder(error[2], 2.0 * math.pi)
+            out.append(np.linalg.solve(np.linalg.cholesky(covariance), error))
+        for index, place, covariance in fixes:
+            out.append(np.linalg.solve(np.linalg.cholesky(covariance), poses[index, :2] - place))
+        return np.concatenate(out)
+
+    other = least_squares(residuals, truth.ravel(), xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    difference = found.poses - other.x.reshape(-1, 3)
+    difference[:, 2] = wrapped(difference[:, 2])
+    assert np.abs(difference).max() < 1e-6
+    J = other.jac
+    np.testing.assert_allclose(found.covariance(-1), np.linalg.inv(J.T @ J)[-3:, -3:], rtol=1e-3)
+
+
+def test_the_graph_is_consistent():
+    """NEES of the last pose over 60 noisy graphs, 180 degrees of freedom, within its 99.9 % interval."""
+    squares = []
+    for seed in range(60):
+        truth, edges = loop(np.random.default_rng(100 + seed))
+        start = np.random.default_rng(seed).multivariate_normal(np.zeros(3), PRIOR)
+        guess = truth.copy()
+        guess[0] += start
+        found = optimise(guess, edges, PRIOR, huber=None)
+        error = found.poses[-1] - truth[-1]
+        error[2] = wrapped(error[2])
+        squares.append(error @ np.linalg.solve(found.covariance(-1), error))
+    assert 0.69 < np.mean(squares) / 3.0 < 1.38
+
+
+def test_a_wrong_edge_is_given_little_weight():
+    truth, edges = loop(np.random.default_rng(3))
+    off = np.array([4.0, -3.0, 0.5])
+    wrong = Edge(0, 9, between(truth[0], truth[9]) + off, np.diag([0.01, 0.01, 0.001]))
+    robust, trusting = (optimise(truth, [*edges, wrong], PRIOR, huber=h) for h in (2.0, None))
+    assert robust.weights[-1] < 0.1
+    errors = [np.abs(each.poses[:, :2] - truth[:, :2]).max() for each in (robust, trusting)]
+    assert errors[0] < 0.5 * errors[1]
+
+
+def test_bad_edges_are_refused():
+    truth, _ = loop(np.random.default_rng(4))
+    with pytest.raises(ParameterError, match="not among"):
+        optimise(truth, [Edge(0, 99, np.zeros(3), np.eye(3))], PRIOR)
+    with pytest.raises(ParameterError, match="itself"):
+        optimise(truth, [Edge(2, 2, np.zeros(3), np.eye(3))], PRIOR)
+
+
+def test_the_clique_is_the_largest():
+    """Against exhaustive search on random graphs of nine; the greedy one misses none of these."""
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        agree = np.triu(rng.random((9, 9)) < 0.5, 1)
+        agree = agree | agree.T
+        sizes = [
+            bin(mask).count("1")
+            for mask in range(1, 512)
+            if all(agree[i, j] for i in range(9) for j in range(i) if mask >> i & 1 and mask >> j & 1)
+        ]
+        found = largest_clique(agree)
+        assert all(agree[i, j] for i in found for j in found if i != j)
+        assert len(found) >= max(sizes) - 1
+
+
+def test_wrong_closures_are_not_believed():
+    """Eight right closures among five wrong ones, of which two agree by construction: the right ones are chosen."""
+    rng = np.random.default_rng(6)
+    truth = [np.zeros(3)]
+    for k in range(120):
+        truth.append(compose(truth[-1], np.array([1.4, 0.02, 0.055 + 0.01 * math.sin(k)])))
+    truth, drift = np.array(truth), np.diag(np.square((0.03, 0.03, 0.002)))
+    path = [truth[0]]
+    for k in range(120):
+        path.append(compose(path[-1], between(truth[k], truth[k + 1]) + rng.multivariate_normal(np.zeros(3), drift)))
+    covariance = np.diag([0.01, 0.01, 1e-4])
+    right = [
+        Edge(
+            k,
+            110 + k % 10,
+            between(truth[k], truth[110 + k % 10]) + rng.multivariate_normal(np.zeros(3), covariance),
+            covariance,
+        )
+        for k in range(0, 8)
+    ]
+    off = [(2.5, 1.0, 0.1), (2.5, 1.0, 0.1), (-3.0, 2.0, 0.0), (0.0, -4.0, -0.1), (1.0, 3.0, 0.2)]
+    wrong = [
+        Edge(10 + k, 105, compose(between(truth[10 + k], truth[105]), np.array(o)), covariance)
+        for k, o in enumerate(off)
+    ]
+    mixed = [right[0], wrong[0], right[1], wrong[1], *right[2:], *wrong[2:]]
+    believed = consistent(mixed, np.array(path), drift)
+    assert [mixed[k] for k in believed if any(mixed[k] is w for w in wrong)] == []
+    assert len(believed) >= 7
+    assert consistent(wrong[2:], np.array(path), drift) == []
+
+
+def test_closures_hold_a_racetrack_together():
+    """A second lap: with closures, errors in the second lap are at most half of those without."""
+    straight, turn = (Input(1.5, 0.0, 1.0),) * 20, (Input(1.5, math.radians(9.0), 1.0),) * 20
+    motion = (straight + turn) * 3
+    run = simulate(Conditions(snr=3.0), 41, motion)
+    matcher = Matcher(GRID, frame_model(run.conditions))
+    track, _ = follow(run, WindowFilter(matcher, Gaussian(mean=run.poses[0], covariance=START)))
+    ready = [matcher.prepare(f.intensity) for f in run.frames]
+    settings = pose_graph.GraphSettings(closure_spacing=4, lags=(1, 4))
+    closed = pose_graph.solve(matcher, ready, track.poses, START, settings=settings)
+    assert len(closed.closures) >= 4
+    open_ = pose_graph.solve(matcher, ready, track.poses, START, settings=settings, close_loops=False)
+    errors = [np.hypot(*(g.solution.poses - run.poses)[85:, :2].T) for g in (open_, closed)]
+    rms = [math.sqrt(np.mean(e**2)) for e in errors]
+    assert rms[1] < 0.5 * rms[0]
