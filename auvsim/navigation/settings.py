@@ -32,9 +32,7 @@ class AugmentedSettings(_Assumed):
 
     kind: Literal["augmented_ekf", "ukf"] = Field(
         default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, range_ekf, motion_radius, "
-        "path_prediction, paper, current_only, delay_only, "
-        "regular_ekf, module:factory",
+        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, range_ekf, ..., module:factory",
     )
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")

@@ -236,3 +236,11 @@ def test_what_is_under_way_is_known():
     assert (fate.destination, fate.fate) == ("b", "under way")
     fleet.run(8.0)
     assert fleet.modems.under_way() == []
+
+
+def test_ranges_are_between_transducers():
+    """20 m ahead of the body's origin, which heads 0.4 rad, and 3 m above it."""
+    modem = {"transducer": (20.0, 0.0, -3.0)}
+    fleet = Fleet({"a": ((0, 0, 20), STILL, tell(100.0)), "b": ((0, 750, 20), STILL, modem)}).run(5.0)
+    place = (20.0 * math.cos(0.4), 750.0 + 20.0 * math.sin(0.4), 17.0)
+    assert fleet.heard["b"][0].range == pytest.approx(math.dist(place, (0.0, 0.0, 20.0)), abs=1e-6)
