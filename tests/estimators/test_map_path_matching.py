@@ -121,8 +121,7 @@ def biases(conditions, model, seeds):
     return offsets, covariances
 
 
-@pytest.mark.parametrize("weighting", ["field", "point"])
-@pytest.mark.parametrize("curved", [False, True])
+@pytest.mark.parametrize(("weighting", "curved"), [("field", False), ("field", True), ("point", True)])
 def test_a_match_has_hardly_a_bias(weighting, curved):
     """At 20 dB at most 2 cm a frame forward, straight and on an arc; a sum over the overlap has 5 to 8 cm."""
     conditions = Conditions(duration=20, snr=20.0)
