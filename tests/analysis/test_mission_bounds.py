@@ -101,15 +101,16 @@ def test_what_is_told_has_the_density_of_its_fixes():
     assert told_density(load_scenario("leader_follower").vehicles["leader"]) == pytest.approx(10.0)
 
 
-@pytest.mark.parametrize(
-    ("runs", "low", "high"), [(16, 0.75, 1.4), pytest.param(150, 0.95, 1.25, marks=pytest.mark.slow)]
-)
-def test_campaigns_at_five_stations_reach_the_map(planned, runs, low, high):
-    """Seeds that nothing was chosen on. Of 16 runs the rms spreads by 9 % at each station, of 150 by 3 %."""
+@pytest.mark.parametrize("runs", [16, pytest.param(300, marks=pytest.mark.slow)])
+def test_campaigns_at_five_stations_reach_the_map(planned, runs):
+    """To reach is 0.95 to 1.25 of the map; a station's rms spreads by 9 % over 16 runs, by 2 % over 300."""
+    slack, ratios = 2.5 * 0.36 / math.sqrt(runs), []
     for k, start in enumerate(STATIONS):
         place, station = at(planned, start)
-        rms = math.sqrt(np.mean([mean_square(station, 5000 + 200 * k + run) for run in range(runs)]))
-        assert low < rms / planned.settled[place] < high, f"{station}: {rms} m"
+        rms = math.sqrt(np.mean([mean_square(station, 5000 + 400 * k + run) for run in range(runs)]))
+        ratios.append(rms / planned.settled[place])
+        assert 0.95 - slack < ratios[-1] < 1.25 + slack, f"{station}: {rms} m"
+    assert 0.95 - 0.4 * slack < np.mean(ratios) < 1.25
     assert not planned.blind.any()
     assert planned.rank.min() == 4
 
