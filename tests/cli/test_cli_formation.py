@@ -60,7 +60,7 @@ def test_it_writes_a_table_and_a_map(capsys, tmp_path):
         (["--leaders", ""], "no leader"),
         (["--leaders", "0,100;0,100"], "two stand"),
         (["--leaders", "0,100;5,5", "--noise", "0"], "--noise 0"),
-        (["--leaders", "0,100;5,5", "--noise", "1,2,3"], "3 values for 2"),
+        (["--leaders", "0,100;5,5", "--noise", "1,2,3"], "3 values, not 1 or 2"),
         (["--leaders", "0,0;5,5"], "follower is where"),
         (["--leaders", "nan,0;5,5"], "finite"),
         (["--leaders", "0,100;5"], "north,east"),

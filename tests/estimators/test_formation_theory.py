@@ -93,6 +93,7 @@ def test_equation_17_is_the_condition_of_the_papers_matrix(scale):
     assert observability.condition_paper(g) == pytest.approx(svd, rel=1e-11)
     matrix = observability.paper(PLACE, LEADERS * scale, VELOCITY)
     gram = matrix.T @ matrix
+    assert (3.0 + g.tau) ** 2 - 4.0 * np.linalg.det(gram) == pytest.approx(9.0 - 4.0 * observability.ja(g), rel=1e-11)
     assert (np.trace(gram), np.linalg.det(gram)) == pytest.approx((3.0 + g.tau, g.s1 + g.tau * g.s2), rel=1e-11)
     # As printed, (-3 - tau - root) / (-3 - tau + root) is the condition number, not its reciprocal.
     root = math.sqrt(9.0 - (4.0 * g.s1 + g.tau * (4.0 * g.s2 - g.tau - 6.0)))

@@ -95,7 +95,7 @@ def test_behind_it_is_faster_and_to_starboard_it_turns_to_port():
 @pytest.mark.parametrize("known", [True, False])
 def test_a_current_is_steered_against_whoever_knows_it(known):
     """As a state of its own, or only as part of the velocity over ground: in two minutes it is made up for."""
-    m, current = mission(leaders=()), 0.3 * STARBOARD
+    m, current = mission(leaders=()), 0.25 * STARBOARD + 0.15 * AHEAD
     heading, speed = COURSE, SPEED
     for k in range(120):
         own = np.array([speed, 0.0])
