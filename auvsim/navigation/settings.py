@@ -69,8 +69,7 @@ class RobustSettings(InteractingSettings):
 
     kind: Literal["robust"] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
         default="robust",
-        description="robust, augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, current_only, delay_only, "
-        "regular_ekf, module:factory",
+        description="robust, imm, imm_biased, augmented_ekf, ukf, dead_reckoning, paper, delay_only, or module:factory",
     )
     compass_bias_deg: float = Field(default=2.0, ge=0, description="assumed compass bias, which it estimates, sd [deg]")
     gust_noise: float = Field(default=2e-3, ge=0, description="random walk of the current in gusty water [m2/s3]")

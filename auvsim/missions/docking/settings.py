@@ -63,8 +63,7 @@ class DockingSettings(Settings):
     uncertain_timeout: float | None = Field(
         default=None,
         gt=0,
-        description="time in the last metres with a deviation across the axis above the mouth's radius that breaks an "
-        "approach off; none: decided at their begin [s]",
+        description="time too uncertain in the last metres that breaks it off; none: decided before [s]",
     )
     lost_timeout: float = Field(default=180.0, gt=0, description="time without a fix that ends the trial [s]")
     progress_timeout: float = Field(
