@@ -17,7 +17,7 @@ from pydantic import Field, field_validator, model_validator
 
 from auvsim.acoustics.message import Message, UsblPacket
 from auvsim.acoustics.motion import interpolate
-from auvsim.base.frames import rotation, wrap
+from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.randomness import Noise
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
