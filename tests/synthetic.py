@@ -78,7 +78,7 @@ class Writer:
 
     def phase(self, time: float, name: str, attempt=1, heading=0.0, depth=5.0, speed=1.5, along=0.0, cross=0.0) -> None:
         """A row of a docking."""
-        self.append("mission", (time, PHASES.index(name), heading, depth, speed, attempt, along, cross))
+        self.append("mission", (time, PHASES.index(name), heading, depth, speed, attempt, along, cross, 0.1, 0.05, 0.0))
 
     def estimate(self, time, position, heading, velocity, current, covariance, refused=0, initialised=True) -> None:
         """A row of the estimate, whose states are the planar ones."""

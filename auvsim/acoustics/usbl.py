@@ -17,7 +17,7 @@ from pydantic import Field, field_validator, model_validator
 
 from auvsim.acoustics.message import Message, UsblPacket
 from auvsim.acoustics.motion import interpolate
-from auvsim.base.frames import rotation, wrap
+from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.randomness import Noise
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
@@ -52,6 +52,14 @@ class UsblSettings(Settings):
     outlier_probability: float = Field(default=0.02, ge=0.0, le=1.0, description="share of outliers [-]")
     outlier_minimum: float = Field(default=10.0, ge=0.0, description="smallest extra error of an outlier [m]")
     outlier_maximum: float = Field(default=30.0, ge=0.0, description="largest extra error of an outlier [m]")
+    burst_range: float | None = Field(
+        default=None,
+        gt=0.0,
+        description="range at which a burst of one false position begins, each time it is passed [m]",
+    )
+    burst_duration: float = Field(
+        default=15.0, ge=0.0, description="duration of a burst; the position is wrong as an outlier is [s]"
+    )
     dock_heading_bias_deg: float = Field(default=0.3, ge=0.0, description="dock heading bias of a trial, sd [deg]")
     dock_tilt_bias_deg: float = Field(default=0.3, ge=0.0, description="dock pitch, roll bias of a trial, sd [deg]")
     dock_depth_noise: float = Field(default=0.02, ge=0.0, description="white noise of the dock's depth, sd [m]")
@@ -169,6 +177,8 @@ class Usbl:
         self._transponder = np.array(settings.transponder)
         self._next = settings.interval * (1.0 - self._noise.uniforms(1)[0])  # phase in (0, interval]
         self._sequence = 0
+        self._was_beyond = False  # whether the last ping was from beyond the range at which bursts begin
+        self._burst: tuple[float, Array] = (-math.inf, np.zeros(3))  # its end [s] and the false position
 
     def poll(self, previous: Truth, now: Truth) -> list[Ping]:
         """The pings in (previous.time, now.time]; call it with every pair of consecutive truths.
@@ -196,8 +206,11 @@ class Usbl:
         outlier = chance < settings.outlier_probability
         if outlier:
             direction = np.array(draws[3:6])  # a normalised normal vector is uniform on the sphere
-            size = settings.outlier_minimum + size * (settings.outlier_maximum - settings.outlier_minimum)
-            measured += size / math.sqrt(float(direction @ direction)) * direction
+            error = settings.outlier_minimum + size * (settings.outlier_maximum - settings.outlier_minimum)
+            measured += error / math.sqrt(float(direction @ direction)) * direction
+        if settings.burst_range is not None:
+            measured, false = self._in_burst(time, slant_range, measured, draws[3:6], size)
+            outlier = outlier or false
         depth = self._dock_depth + settings.dock_depth_noise * draws[6]
         value = np.array((*measured.tolist(), *self._dock_attitude, depth))
         reading = Reading("usbl", time + self._clock_offset, math.nan, value, self._sequence)
@@ -206,6 +219,24 @@ class Usbl:
         self._next = time + self._wait(slant_range, wait)
         lost = settings.maximum_range is not None and slant_range > settings.maximum_range
         return Ping(message=message, slant_range=slant_range, outlier=outlier, lost=lost)
+
+    def _in_burst(
+        self, time: float, slant_range: float, measured: Array, direction: list[float], size: float
+    ) -> tuple[Array, bool]:
+        """What is shown in place of a measured position, and whether it is the false one of a burst.
+
+        A burst is a reflection from something fixed: all its pings show one place, off the vehicle's at its begin as an
+        outlier is, horizontally.
+        """
+        settings = self._settings
+        assert settings.burst_range is not None
+        beyond = slant_range > settings.burst_range
+        if self._was_beyond and not beyond and time >= self._burst[0]:
+            level = np.array((*direction[:2], 0.0))
+            step = settings.outlier_minimum + size * (settings.outlier_maximum - settings.outlier_minimum)
+            self._burst = (time + settings.burst_duration, measured + step / np.linalg.norm(level) * level)
+        self._was_beyond = beyond
+        return (self._burst[1].copy(), True) if time < self._burst[0] else (measured, False)
 
     def _wait(self, slant_range: float, draw: float) -> float:
         settings = self._settings

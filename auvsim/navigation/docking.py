@@ -14,7 +14,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, wrap
 from auvsim.base.reading import Reading
 from auvsim.navigation import aids
-from auvsim.navigation.estimate import PLANAR_STATES, Estimate
+from auvsim.navigation.estimate import DEPTH_BIAS, PLANAR_STATES, Estimate
 from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.sensors.dvl import DvlSettings
@@ -27,10 +27,18 @@ from estimators.core.types import Gaussian
 from estimators.docking.estimator import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
 from estimators.docking.models import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.docking.usbl import UsblFix, UsblModel
+from estimators.docking.vertical import VerticalFilter
 
 TURN = 10.0  # mean duration of a turn of the current that the interacting filters expect [s]
 SETTLING = 50.0  # mean time after it for which its memory is kept apart [s]
+KEEP = 30.0  # age up to which fixes are used where no setting says it [s]
+ECHO = 20.0  # time for which a false echo may show one place [s]
+CALM = 100.0  # mean time that gusty water stays so [s]
 DEPTH_GAINS = (0.09, 0.0042)  # of the depth gauge's alpha-beta filter, steady state for 0.05 m and 0.02 m/s2
+BIAS_UNITS = {
+    "compass": "rad", "dock_heading": "rad", "clock": "s", "surge": "m/s2", "gyro": "rad/s", "dvl_surge": "m/s",
+    "dvl_sway": "m/s",
+}  # fmt: skip
 # Of the position where a DVL tells the velocity [m2/s]: its errors of scale and mounting are no constants, but turn and
 # grow with the velocity, and the model's surge is not level in a dive. Without it the filter believed itself too much.
 DOPPLER_WALK = 4e-4
@@ -44,26 +52,37 @@ class DockingNavigator:
 
     Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
     feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. So do
-    ranges, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed.
+    ranges, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed; what it shows too much against the
+    dock's is a state of its own.
 
     Args:
         estimator: in whose axes the dock's mouth is the origin.
         actuation: of the vehicle.
         dock: (2,) north, east of the dock's mouth [m].
         aids: settings of the sensors it uses besides, by name.
+        vertical: filter of that state.
     """
 
-    states = PLANAR_STATES
-
     def __init__(
-        self, estimator: DockingEstimator, actuation: FinsAndShaft, dock: Array, aids: Mapping[str, Any] | None = None
+        self,
+        estimator: DockingEstimator,
+        actuation: FinsAndShaft,
+        dock: Array,
+        aids: Mapping[str, Any] | None = None,
+        vertical: VerticalFilter | None = None,
     ) -> None:
-        self._estimator, self._actuation, self._dock, self._aids = estimator, actuation, dock, dict(aids or {})
+        self._estimator, self._actuation = estimator, actuation
+        self._vertical = vertical or VerticalFilter(UsblModel())
+        self._dock, self._aids = dock, dict(aids or {})
+        biases = {f"{name}_bias": BIAS_UNITS.get(name, "1") for name in estimator.filter.noise.bias_names}
+        self.states: Mapping[str, str] = {**PLANAR_STATES, **biases, DEPTH_BIAS: "m"}
+        self._names = tuple(self.states)
         self.reset()
 
     def reset(self) -> None:
         """Forgets everything."""
         self._estimator.reset()
+        self._vertical.reset()
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._yaw_rate = 0.0
         self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
@@ -72,7 +91,7 @@ class DockingNavigator:
         self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
     ) -> Estimate:
         """The estimate at `time`, see `Navigator.update`."""
-        headings, stamps, drives, fixes = [], [], [], []
+        headings, stamps, drives, fixes, reports = [], [], [], [], []
         aided: dict[Any, Reading] = {}  # the last reading of a sensor, but every range
         for reading in readings:
             if reading.sensor == "compass":
@@ -90,6 +109,7 @@ class DockingNavigator:
                     position=(x, y, z), heading=heading, pitch=pitch, roll=roll,
                 )  # fmt: skip
                 fixes.append(fix)
+                reports.append(float(reading.value[6]))
             elif reading.sensor in self._aids:
                 is_range = isinstance(self._aids[reading.sensor], RangeSettings)
                 aided[reading.sensor, reading.sequence if is_range else None] = reading
@@ -102,18 +122,22 @@ class DockingNavigator:
         more = [m for r in aided.values() for m in measurements(r, self._aids[r.sensor], depth, origin, self._tilt)]
         heading = self._heading_now(time, headings, stamps)
         result = self._estimator.tick(time, heading, rudder, shaft_speed, fixes, more)
-        mean = result.mean.copy()
-        mean[:2] += self._dock
+        now = self._depth.at(time) or 0.0
+        self._vertical.gauge(time, now)
+        for fix, report in zip(fixes, reports, strict=True):
+            self._vertical.fix(fix, report)
+        mean, covariance = self._with_depth(result.mean, result.covariance)
         self._yaw_rate = float(mean[5])
         return Estimate(
             time=time,
-            position=np.array([mean[0], mean[1], self._depth.at(time) or 0.0]),
+            position=np.array([mean[0], mean[1], now]),
             heading=float(mean[2]),
             velocity=mean[3:6],
             current=mean[6:8],
-            covariance=result.covariance,
+            covariance=covariance,
             initialised=result.initialised,
             mean=mean,
+            names=self._names,
             refused=sum(result.refused.values()),
             reasons=result.refused,
             reinitialised=result.reinitialised,
@@ -132,13 +156,17 @@ class DockingNavigator:
 
     def smoothed(self) -> list[tuple[float, Gaussian]]:
         """See `Buffered`."""
-        shift = np.zeros(len(self.states))
-        shift[:2] = self._dock
-        n = shift.size
-        return [
-            (time, Gaussian(mean=b.mean[:n] + shift, covariance=b.covariance[:n, :n]))
-            for time, b in self._estimator.smoothed()
-        ]
+        pairs = [(time, self._with_depth(b.mean, b.covariance)) for time, b in self._estimator.smoothed()]
+        return [(time, Gaussian(mean=mean, covariance=covariance)) for time, (mean, covariance) in pairs]
+
+    def _with_depth(self, mean: Array, covariance: Array) -> tuple[Array, Array]:
+        """Mean and covariance from the datum, with what the gauge shows too much."""
+        n = mean.size
+        whole, both = np.empty(n + 1), np.zeros((n + 1, n + 1))
+        whole[:n], whole[n] = mean, self._vertical.offset
+        whole[:2] += self._dock
+        both[:n, :n], both[n, n] = covariance, self._vertical.variance
+        return whole, both
 
     def _heading_now(self, time: float, headings: list[float], stamps: list[float]) -> float | None:
         if not headings:
@@ -172,11 +200,14 @@ def navigator(
     if of_kind(used, DvlSettings):
         noise = replace(noise, position=max(noise.position, DOPPLER_WALK))
     white = 0.0 if "dock_heading" in base.biases else math.radians(s.dock_heading_deg)
+    scale, keep = getattr(s, "usbl_noise", 1.0), getattr(s, "keep", KEEP)
     model = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=white)
+    model = replace(model, deviations=tuple(scale * deviation for deviation in model.deviations))
     more = {"aids": aids.assumed(used)} if used else {}
     filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2], **more)
-    estimator = DockingEstimator(filter_, model, step=setup.period, compensate_delay=delayed)
-    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used)
+    estimator = DockingEstimator(filter_, model, step=setup.period, keep=keep, compensate_delay=delayed)
+    vertical = VerticalFilter(model, setup.usbl.transponder[2], keep=keep)
+    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used, vertical)
 
 
 def regular_ekf(setup: NavigatorSetup) -> Navigator:
@@ -221,6 +252,30 @@ def imm_biased(setup: NavigatorSetup) -> Navigator:
     times as much in it.
     """
     return _interacting(setup, BIASES_OF_VEHICLE, ANY)
+
+
+def robust(setup: NavigatorSetup) -> Navigator:
+    """Interacting filters that need no choosing: steady, gusty and turning currents, compass errors, outliers.
+
+    The modes: steady water; gusts, which last; a turn, which is short.
+    """
+    s = setup.settings
+    noise = _noise(s)
+    compass = {"compass": Bias(math.radians(s.compass_bias_deg))} if s.compass_bias_deg > 0.0 else {}
+    clock = {"clock": Bias(s.dock_clock)} if s.dock_clock > 0.0 else {}
+    turns, ends, gusts, calms = 1.0 / s.turn_interval, 1.0 / TURN, 1.0 / s.gust_interval, 1.0 / CALM
+    rates = ((0.0, gusts, turns), (calms, 0.0, turns), (0.5 * ends, 0.5 * ends, 0.0))
+    currents = (s.steady_noise, s.gust_noise, s.turning_noise)
+    shares = np.array((1.0, gusts / calms, turns / ends))
+    kind = partial(
+        InteractingFilter,
+        currents=currents,
+        switching=rates,
+        initial=shares / shares.sum(),
+        outliers=Outliers(prior=s.outlier_probability, deviations=ANY.deviations),
+        echo=ECHO,
+    )
+    return navigator(setup, kind, replace(noise, biases={**compass, **noise.biases, **clock}))
 
 
 def _interacting(setup: NavigatorSetup, biases: Mapping[str, Bias], outliers: Outliers) -> Navigator:

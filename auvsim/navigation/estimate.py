@@ -23,6 +23,8 @@ PLANAR_STATES: Mapping[str, str] = MappingProxyType(
         "current_east": "m/s",
     }
 )
+# Constant errors that guidance heeds where they are estimated: what a sensor shows too much.
+COMPASS_BIAS, DOCK_HEADING_BIAS, DEPTH_BIAS = "compass_bias", "dock_heading_bias", "depth_bias"
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -37,6 +39,7 @@ class Estimate:
     covariance: Array  # (n, n) of the states; zeros where not estimated
     initialised: bool  # false until position is known
     mean: Array | None = None  # (n,) of the states; None: the eight planar ones, as the views say
+    names: tuple[str, ...] = tuple(PLANAR_STATES)  # of the states, in their order
     refused: int = 0  # measurements refused so far
     reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
     reinitialised: int = 0  # number of restarts after its numbers were no longer finite
@@ -48,6 +51,16 @@ class Estimate:
         if self.mean is not None:
             return self.mean
         return np.array((*self.position[:2], self.heading, *self.velocity, *self.current))
+
+    def value(self, name: str, default: float = 0.0) -> float:
+        """Mean of a named state; a default where it is not estimated."""
+        return float(self.state[self.names.index(name)]) if name in self.names else default
+
+    def deviation(self, slopes: Mapping[str, float]) -> float:
+        """Standard deviation of a quantity that changes by `slopes` with the named states; others do not count."""
+        places = [k for k, name in enumerate(self.names) if name in slopes]
+        slope = np.array([slopes[self.names[k]] for k in places])
+        return math.sqrt(max(float(slope @ self.covariance[np.ix_(places, places)] @ slope), 0.0))
 
     @property
     def horizontal_covariance(self) -> Array:

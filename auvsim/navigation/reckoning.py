@@ -117,6 +117,7 @@ class ReckoningNavigator:
             covariance=belief.covariance,
             initialised=result.belief is not None,
             mean=mean,
+            names=tuple(self.states),
             refused=sum(result.refused.values()),
             reasons=result.refused,
             reinitialised=result.reinitialised,

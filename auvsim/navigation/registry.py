@@ -15,6 +15,7 @@ _SHIPPED: tuple[NavigatorFactory, ...] = (
     docking.ukf,
     docking.imm,
     docking.imm_biased,
+    docking.robust,
     docking.paper,
     docking.current_only,
     docking.delay_only,

@@ -30,10 +30,7 @@ class PaperSettings(_Assumed):
 class AugmentedSettings(_Assumed):
     """Kalman filters with the current in their state."""
 
-    kind: Literal["augmented_ekf", "ukf"] = Field(
-        default="augmented_ekf",
-        description="augmented_ekf, ukf, imm, imm_biased, dead_reckoning, paper, range_ekf, ..., module:factory",
-    )
+    kind: Literal["augmented_ekf", "ukf"] = Field(default="augmented_ekf")
     compass_deg: float = Field(default=1.0, gt=0, description="assumed compass noise per reading, sd [deg]")
     position_noise: float = Field(default=4e-5, ge=0, description="process noise of position [m2/s]")
     heading_noise: float = Field(default=1e-6, ge=0, description="process noise of heading [rad2/s]")
@@ -65,6 +62,29 @@ class InteractingSettings(AugmentedSettings):
     compass_bias_deg: float = Field(
         default=0.5, ge=0, description="assumed compass bias, which the imm estimates, sd [deg]"
     )
+
+
+class RobustSettings(InteractingSettings):
+    """Interacting filters for steady, gusty and turning currents, errors of the compass, outliers and false echoes."""
+
+    kind: Literal["robust"] = Field(  # pyright: ignore[reportIncompatibleVariableOverride]
+        default="robust",
+        description="robust, imm, imm_biased, augmented_ekf, ukf, dead_reckoning, paper, delay_only, or module:factory",
+    )
+    compass_bias_deg: float = Field(default=2.0, ge=0, description="assumed compass bias, which it estimates, sd [deg]")
+    gust_noise: float = Field(default=2e-3, ge=0, description="random walk of the current in gusty water [m2/s3]")
+    turn_interval: float = Field(default=3000.0, gt=0, description="mean time between turns that it assumes [s]")
+    gust_interval: float = Field(
+        default=3000.0, gt=0, description="mean time in steady water before it becomes gusty [s]"
+    )
+    outlier_probability: float = Field(
+        default=0.05, gt=0, lt=1, description="assumed share of fixes that are wrong [-]"
+    )
+    usbl_noise: float = Field(default=1.0, gt=0, description="factor on the assumed noise of fixes [-]")
+    dock_clock: float = Field(
+        default=0.0, ge=0, description="assumed offset of the dock's clock, which it estimates, sd; 0: none [s]"
+    )
+    keep: float = Field(default=40.0, gt=0, description="age up to which fixes are used [s]")
 
 
 class ReckoningSettings(_Assumed):
@@ -137,7 +157,8 @@ class OwnEstimator(OwnPart, _Assumed):
 
 
 EstimatorSettings = Annotated[
-    Annotated[AugmentedSettings, Tag("AugmentedSettings")]
+    Annotated[RobustSettings, Tag("RobustSettings")]
+    | Annotated[AugmentedSettings, Tag("AugmentedSettings")]
     | Annotated[InteractingSettings, Tag("InteractingSettings")]
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
@@ -147,6 +168,7 @@ EstimatorSettings = Annotated[
     | Annotated[OwnEstimator, Tag("OwnEstimator")],
     Discriminator(
         tag_by_kind(
+            RobustSettings,
             AugmentedSettings,
             InteractingSettings,
             PaperSettings,

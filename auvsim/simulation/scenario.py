@@ -20,7 +20,7 @@ from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.missions.track.mission import TrackSettings
 from auvsim.missions.track.patterns import Circle, Weave, points
-from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.navigation.settings import EstimatorSettings, RobustSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
@@ -85,7 +85,7 @@ class VehicleSettings(Settings):
     start: Start = Start()
     ballast: BallastSettings = BallastSettings()
     sensors: SensorSettings = SensorSettings()
-    estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
+    estimator: EstimatorSettings = Field(default=RobustSettings(), description="The estimator, by its `kind`.")
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
     mission: MissionSettings = Field(default=DockingSettings(), description="The mission, by its `kind`.")
     modem: ModemSettings | None = Field(default=None, description="acoustic modem; none: it has none")

@@ -18,7 +18,7 @@ from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
 from auvsim.missions.manoeuvres.settings import ManoeuvreSettings
 from auvsim.missions.registry import MissionSettings
-from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
+from auvsim.navigation.settings import EstimatorSettings, RobustSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import WorldSettings
 from auvsim.simulation.scenario import DatumSettings, Rates, Scenario, Start, StructureSettings, validated
@@ -59,7 +59,7 @@ class ShortScenario(Settings):
     )
     sensors: SensorSettings = SensorSettings()
     acoustics: AcousticSettings = AcousticSettings()
-    estimator: EstimatorSettings = Field(default=AugmentedSettings(), description="The estimator, by its `kind`.")
+    estimator: EstimatorSettings = Field(default=RobustSettings(), description="The estimator, by its `kind`.")
     guidance: DockingSettings = DockingSettings()
     control: ControlSettings = Field(default=AutopilotSettings(), description="The controller, by its `kind`.")
     world: WorldSettings = WorldSettings()

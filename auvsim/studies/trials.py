@@ -23,6 +23,8 @@ class Summary:
     attempts: int
     time: float  # [s]
     miss_distance: float | None  # [m]
+    cross_track: float | None  # its part across the axis [m]
+    vertical: float | None  # its part downward [m]
     heading_error_deg: float | None
     contact_impulse: float  # [N s]
     peak_contact_force: float  # [N]

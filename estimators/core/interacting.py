@@ -27,6 +27,7 @@ from estimators.core.types import (
 )
 
 SHORTEST = 0.1  # time between measurements that counts at least, so that no mode ever dies out [s]
+APART = 2.0  # time between two measurements from which a velocity may be told [s]
 MIN_ACCEPTED = 3  # measurements accepted before two that agree with each other no longer suffice to correct the filter
 
 
@@ -42,6 +43,7 @@ class InteractingState(NamedTuple):
     innovation: Innovation | None = None  # of the last of them, in the mode most probable then
     verdicts: Verdicts = ()  # on this node's measurements, and revised ones
     angles: tuple[int, ...] = (2,)  # states that are angles
+    last_accepted: float = math.nan  # stamp of the last of them that was more probably right [s]
 
     @property
     def belief(self) -> Gaussian:
@@ -67,6 +69,8 @@ class InteractingModelFilter:
         initial: Probabilities of the modes at first (m,).
         mixtures: Model of outliers, by kind.
         recovery: What to do about measurements that are rejected again and again.
+        echo: Time for which wrong measurements may agree, as false echoes do [s]: none is let in before, and a
+            velocity is told from two that lie `APART`.
         blended: The process that stands for all modes of given probabilities, for smoothing; None: the most probable's.
 
     Raises:
@@ -83,6 +87,7 @@ class InteractingModelFilter:
         initial: Sequence[float],
         mixtures: Mapping[str, Outliers],
         recovery: Recovery,
+        echo: float = 0.0,
         blended: Callable[[Array], ProcessModel] | None = None,
     ) -> None:
         self._processes, self.sensors, self._start = tuple(processes), sensors, start
@@ -92,6 +97,7 @@ class InteractingModelFilter:
         if not (shaped and abs(self._initial.sum() - 1.0) < 1e-9):
             raise ParameterError(f"initial {list(initial)} must be {len(processes)} probabilities above 0 of sum 1")
         self._mixtures, self._recovery, self._blended = dict(mixtures), recovery, blended
+        self._echo = echo
         self._angles = self._processes[0].angles
 
     def start(self, nodes: Sequence[Node[InteractingState]], index: int) -> InteractingState | None:
@@ -104,7 +110,9 @@ class InteractingModelFilter:
         last = max((m.stamp for m in used if m.kind in self._mixtures), default=nodes[index].time)
         verdicts = tuple((m, "", math.nan) for m in used)
         beliefs = (belief,) * len(self._processes)
-        state = InteractingState(beliefs, self._initial, last, verdicts=verdicts, angles=self._angles)
+        state = InteractingState(
+            beliefs, self._initial, last, verdicts=verdicts, angles=self._angles, last_accepted=last
+        )
         others = [m for m in nodes[index].measurements if id(m) not in known]
         return self.correct(state, nodes[index].time, others)
 
@@ -151,28 +159,35 @@ class InteractingModelFilter:
             now = _rejected(state, fix, model, modes, innovation)
             agreeing = self._recovery.agreeing(now, own)
             enough = self._recovery.suffice(now, own, agreeing, state.accepted >= MIN_ACCEPTED)
-            if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED):
-                earlier = agreeing[0] if agreeing else own[-1]
+            lasts = bool(own) and fix.stamp - own[0].measurement.stamp >= self._echo
+            if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED and lasts):
+                earlier = own[-1] if not agreeing else _apart(now, agreeing) if self._echo else agreeing[0]
                 beliefs = (self._recovery.recover(state.belief, earlier, now, model),) * len(modes)
                 verdicts = (*state.verdicts, (fix, "", innovation.nis))
                 if self._recovery.fuses_both:
                     verdicts += tuple(found.taken for found in agreeing or (earlier,))
                     count -= len(agreeing)
                 return InteractingState(
-                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles
+                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles, fix.stamp
                 )
-            if is_wrong:
-                rejected = (
-                    (*rejected, *own[1 - REMEMBERED :], now) if len(own) >= REMEMBERED else (*state.rejected, now)
-                )
+            if is_wrong:  # the first of them says when it began, the last ones what it is
+                first = own[:1] if self._echo else own[1 - REMEMBERED : 2 - REMEMBERED]
+                kept = (*first, *own[2 - REMEMBERED :]) if len(own) >= REMEMBERED else own
+                rejected = (*rejected, *kept, now)
             count += is_wrong
         accepted = state.accepted + (not is_wrong)
         transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
         beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, self._angles)
         verdicts = (*state.verdicts, (fix, OUTLIER if is_wrong else "", innovation.nis))
+        last_accepted = state.last_accepted if is_wrong else fix.stamp
         return InteractingState(
-            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles
+            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles, last_accepted
         )
+
+
+def _apart(now: Rejected, agreeing: Sequence[Rejected]) -> Rejected:
+    """The latest of those that agree that is long enough before that of now to tell a velocity; else the first."""
+    return next((r for r in agreeing if now.measurement.stamp - r.measurement.stamp >= APART), agreeing[-1])
 
 
 def _rejected(
@@ -184,7 +199,8 @@ def _rejected(
 ) -> Rejected:
     """A measurement as seen by the modes together, before it was used."""
     residual = np.sum([w * m.innovation.residual for w, m in zip(state.weights, modes, strict=True)], axis=0)
-    return Rejected(fix, residual, model.jacobian(state.belief.mean, fix), innovation.nis, innovation)
+    since = fix.stamp - state.last_accepted
+    return Rejected(fix, residual, model.jacobian(state.belief.mean, fix), innovation.nis, innovation, since)
 
 
 def generator(rates: Array, modes: int) -> Array:

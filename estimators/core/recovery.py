@@ -25,6 +25,7 @@ class Rejected(NamedTuple):
     H: Array  # (m, n)
     nis: float = math.nan
     innovation: Innovation | None = None
+    since: float = math.nan  # time from the last one accepted before it [s]
 
     @property
     def taken(self) -> tuple[Measurement, str, float]:

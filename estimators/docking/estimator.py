@@ -59,8 +59,8 @@ class DockingEstimate:
     """What a docking estimator knows at one time; zeros before the first fix."""
 
     time: float  # [s]
-    mean: Array  # (8,) north, east [m], psi [rad], u, v [m/s], r [rad/s], current c_n, c_e [m/s]
-    covariance: Array  # (8, 8), zeros where nothing is estimated
+    mean: Array  # (n,) north, east [m], psi [rad], u, v [m/s], r [rad/s], current c_n, c_e [m/s], then biases
+    covariance: Array  # (n, n), zeros where nothing is estimated
     current: Array  # (2,) north, east [m/s]
     initialised: bool
     refused: Mapping[str, int]  # measurements refused so far, by reason; "outlier" by the filter's gate
@@ -182,11 +182,12 @@ class DockingEstimator:
             self._restarts, self._outliers_before = history.reinitialised, self._outliers
         if state is not None:
             self._outliers = self._outliers_before + state.outliers
-        belief = Gaussian(mean=np.zeros(8), covariance=np.zeros((8, 8))) if state is None else state.belief
+        n = 8 + len(self.filter.noise.bias_names)
+        belief = Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n))) if state is None else state.belief
         return DockingEstimate(
             time=time,
-            mean=belief.mean[:8],
-            covariance=belief.covariance[:8, :8],
+            mean=belief.mean,
+            covariance=belief.covariance,
             current=belief.mean[6:8],
             initialised=state is not None,
             refused={**history.refused, "outlier": self._outliers},

@@ -28,6 +28,7 @@ class InteractingFilter(InteractingModelFilter):
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at the first fix (m,).
         outliers: Model of outliers among the fixes.
+        echo: Time for which a false echo may show one place, which is no jump of the vehicle [s].
         **options: See `PlanarModels`.
     """
 
@@ -40,6 +41,7 @@ class InteractingFilter(InteractingModelFilter):
         switching: Sequence[Sequence[float]] = ((0.0, 6e-4), (2e-3, 0.0)),
         initial: Sequence[float] = (0.5, 0.5),
         outliers: Outliers | None = None,
+        echo: float = 0.0,
         **options: Unpack[ModelOptions],
     ) -> None:
         self.parameters, self.noise = parameters, noise
@@ -56,6 +58,7 @@ class InteractingFilter(InteractingModelFilter):
             switching=switching,
             initial=initial,
             mixtures={USBL: outliers or Outliers()},
-            recovery=FixRecovery(noise),
+            recovery=FixRecovery(noise, echo),
+            echo=echo,
             blended=blended,
         )

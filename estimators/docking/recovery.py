@@ -1,5 +1,6 @@
 """How a filter that rejects fixes finds out that it is wrong itself: fixes that disagree with it, but not together."""
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -9,6 +10,8 @@ from estimators.core.consistency import chi_square
 from estimators.core.recovery import AGREEMENT, MAX_AGE, Rejected
 from estimators.core.types import Gaussian, MeasurementModel
 from estimators.docking.models import DockingNoise
+
+PLAUSIBLE = 0.999  # probability with which a change of the current is taken for one
 
 
 def agreeing(now: Rejected, rejected: Sequence[Rejected], noise: DockingNoise) -> list[Rejected]:
@@ -39,6 +42,15 @@ def agree(now: Rejected, earlier: list[Rejected], noise: DockingNoise) -> bool:
     return float(change @ np.linalg.solve(S, change)) <= chi_square(AGREEMENT, change.size)
 
 
+def plausible(first: Rejected, noise: DockingNoise) -> bool:
+    """Whether a current that changed since the fix before explains the first fix that disagrees."""
+    if first.innovation is None or not math.isfinite(first.since):
+        return True
+    drift = (noise.initial_current * first.since) ** 2 * np.eye(2)
+    nis = float(first.residual @ np.linalg.solve(first.innovation.covariance + drift, first.residual))
+    return nis <= chi_square(PLAUSIBLE, first.residual.size)
+
+
 def recover(belief: Gaussian, earlier: Rejected, now: Rejected, noise: DockingNoise) -> Gaussian:
     """Belief with position and current opened up and both fixes fused, the earlier one carried to now."""
     T = now.measurement.stamp - earlier.measurement.stamp
@@ -55,18 +67,30 @@ def recover(belief: Gaussian, earlier: Rejected, now: Rejected, noise: DockingNo
 
 
 class FixRecovery:
-    """The `Recovery` of a filter on the planar model: its position and its current are opened, both fixes fused."""
+    """The `Recovery` of a filter on the planar model: its position and its current are opened, both fixes fused.
+
+    Args:
+        noise: That the filter assumes.
+        echo: Time for which a false echo may show one place [s]; 0: it does not reckon with any.
+    """
 
     fuses_both = forces = True
 
-    def __init__(self, noise: DockingNoise) -> None:
-        self._noise = noise
+    def __init__(self, noise: DockingNoise, echo: float = 0.0) -> None:
+        self._noise, self._echo = noise, echo
 
     def suffice(
         self, now: Rejected, rejected: Sequence[Rejected], agreeing: Sequence[Rejected], cautious: bool = False
     ) -> bool:
-        """One agreeing fix: it takes two to find the position and the current; for the cautious, two."""
-        return len(agreeing) >= 1 + cautious
+        """One agreeing fix: it takes two to find the position and the current.
+
+        For the cautious, two; and where the track could not have gone to where they say, even in a current that
+        changed, it takes them longer than a false echo lasts.
+        """
+        if not cautious:
+            return len(agreeing) >= 1
+        lasts = bool(agreeing) and now.measurement.stamp - agreeing[-1].measurement.stamp >= self._echo
+        return len(agreeing) >= 2 and (lasts or plausible(rejected[0], self._noise))
 
     def agreeing(self, now: Rejected, rejected: Sequence[Rejected]) -> list[Rejected]:
         """Those of the rejected fixes that agree with that of now and with each other, the latest first."""

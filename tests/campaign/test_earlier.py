@@ -41,11 +41,13 @@ def test_its_table_is_the_same(tmp_path: Path) -> None:
 
 
 def test_it_goes_on_with_the_plan_of_then_and_that_of_today(tmp_path: Path) -> None:
-    """Both are the plan that it holds."""
+    """Both are the plan that it holds, where they ask for the limits of time that docking had then."""
     opened = copied(tmp_path / "c")
     kinds = {"a": {"estimator": {"kind": "imm", "use": []}}, "b": {}}  # filters of then used no DVL and no gyro
     today = {**PLAN, "base": {"duration": 60.0, "estimator": {"kind": "augmented_ekf", "use": []}}, "variants": kinds}
+    limits = {"guidance": {"fix_timeout": 30.0, "uncertain_timeout": 10.0}}
     for values in (PLAN, today):
+        values = {**values, "base": {**values["base"], **limits}}
         with claimed(tmp_path / "c", plan.parse(values), opened.state["versions"]) as found:
             assert all(found.read(name, trial) is not None for name in ("a", "b") for trial in range(3))
 

@@ -93,7 +93,7 @@ def outputs(given, name):
         ]
         estimate = estimator.tick(TICK * k, heading, float(given["rudder"]), 0.0, fixes)
         if k % 20 == 19:
-            said.append((*estimate.mean, *estimate.covariance[upper]))
+            said.append((*estimate.mean[:8], *estimate.covariance[:8, :8][upper]))
     assert estimate is not None
     return np.array(said), np.array([estimate.refused[r] for r in sorted(estimate.refused)])
 

@@ -38,7 +38,8 @@ KEPT = {
     "event/kind": 1,
 }
 FINS = "truth/fins"  # of each twentieth truth
-VARIANCES = "estimate/variances"  # the diagonal of each fourth covariance
+VARIANCES = "estimate/variances"  # of the planar states, of each fourth covariance
+PLANAR = 8  # planar states, before those of errors
 
 
 def part(contents: Contents) -> dict[str, Any]:
@@ -48,7 +49,7 @@ def part(contents: Contents) -> dict[str, Any]:
     kept = {path: whole[path][::step] for path, step in KEPT.items() if path in whole}
     kept[FINS] = np.ascontiguousarray(whole["truth/actuators"][::20, :-1])
     kept["event/kind"] = kept["event/kind"].astype(str)  # objects would be pickled
-    return kept | {VARIANCES: np.diagonal(whole["estimate/covariance"][::4], axis1=1, axis2=2)}
+    return kept | {VARIANCES: np.diagonal(whole["estimate/covariance"][::4], axis1=1, axis2=2)[:, :PLANAR]}
 
 
 def read(name: str) -> dict[str, Any]:

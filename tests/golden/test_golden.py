@@ -63,7 +63,7 @@ def test_cases_show_what_they_are_for():
     """Each case would be worth nothing if it did not go through what it is named after."""
     events = {name: stored.read(name)["event/kind"].tolist() for name in CASES}
     assert [name for name in CASES if "docked" in events[name]] == ["docking", "turning", "outliers"]
-    assert events["turning"].count("go_around") == 1
+    assert events["turning"].count("go_around") >= 1
     assert stored.read("turning")["mission/attempt"][-1] == 2
     assert events["diverging"][-1] == "diverged"
     zigzag = stored.read("zigzag")

@@ -10,10 +10,11 @@ from dockings import DOCK_DEPTH, LATCHED, MOUTH, NOSE, PERIOD, SETTINGS, new, up
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.control.controller import Setpoints
-from auvsim.missions.docking.guidance import CLEAR, Docking, Phase, approach_course
+from auvsim.missions.docking.guidance import CLEAR, Docking, DockingSettings, Phase, approach_course
 from auvsim.missions.line_of_sight import heading_for_course
 from auvsim.navigation.estimate import Estimate
 
+LIMITED = DockingSettings(fix_timeout=30.0, uncertain_timeout=10.0)
 LIMIT = math.radians(SETTINGS.heading_limit_deg)
 
 
@@ -112,7 +113,7 @@ def test_turned_line_runs_through_the_entrance() -> None:
     current = (0.0, 0.5)
     line = approach_course(0.0, SETTINGS.approach_speed, current, LIMIT)
     assert line > 0.1  # turned with the current that flows to starboard: the crab would be 30 degrees
-    guidance = new()
+    guidance = new(DockingSettings(crab_limit_deg=60.0, ground_speed=0.0))  # not faster for the current
     guidance._observe([fix(0.1)])
     courses = {}
     for off in (-2.0, 0.0, 2.0):
@@ -175,16 +176,20 @@ def test_phases_of_a_docking_in_their_order() -> None:
 @pytest.mark.parametrize(
     ("reason", "finish"),
     [
-        ("entrance missed by 1.40 m", lambda s: s.to_final().tick(-0.4, 1.4)),
-        ("entrance missed by 1.40 m", lambda s: s.to_final().tick(-0.4, -1.4)),
-        ("entrance passed without capture", lambda s: s.to_final().tick(LATCHED + 1.6)),
-        ("not captured within 64 s of the last metres", lambda s: s.to_final().tick(0.5, after=64.0)),
+        ("entrance missed by 1.40 m", lambda s: s.to_final().tick(0.1, 1.4)),
+        # Line of sight takes an error back by exp(-way / lookahead): 1.40 m at 0.4 m before the mouth.
+        ("would miss the entrance by 1.32 m", lambda s: s.to_final().tick(-0.4, -1.4)),
+        ("entrance passed without capture", lambda s: s.to_final().tick(LATCHED + 2.6)),
+        (
+            "not captured within 64 s of the last metres: jammed in the funnel at +0.5 m",
+            lambda s: s.to_final().tick(0.5, after=64.0),
+        ),
         ("no fix for 31 s", lambda s: s.to_final().tick(-3.0, fixed=False, after=31.0)),
     ],
 )
 def test_go_around_in_the_last_metres(reason: str, finish) -> None:
     """Every way to fail there is seen, named, and followed by another attempt."""
-    script = Script(new())
+    script = Script(new(LIMITED))
     finish(script)
     assert script.guidance.phase == Phase.GO_AROUND
     assert script.guidance.attempt == 2
@@ -192,11 +197,11 @@ def test_go_around_in_the_last_metres(reason: str, finish) -> None:
 
 
 def test_go_around_on_silence_already_on_the_approach() -> None:
-    """Fixes that stop break the approach off after `fix_timeout`, not before."""
-    script = Script(new())
+    """Fixes that stop break the approach off after `fix_timeout`, where one is set, not before; no attempt counts."""
+    script = Script(new(LIMITED))
     script.tick(-250.0)
     script.tick(-190.0)
-    script.tick(-180.0, fixed=False, after=SETTINGS.fix_timeout - 0.1)
+    script.tick(-180.0, fixed=False, after=29.9)
     assert script.guidance.phase == Phase.APPROACH
     script.tick(-179.0, fixed=False, after=0.2)
     assert script.guidance.phase == Phase.GO_AROUND
@@ -206,7 +211,7 @@ def test_go_around_on_silence_already_on_the_approach() -> None:
 @pytest.mark.parametrize(("sigma", "broken_off"), [(0.7, False), (0.8, True)])
 def test_go_around_on_uncertainty_that_lasts(sigma: float, broken_off: bool) -> None:
     """A deviation across the axis above the mouth's radius, 0.75 m, for ten seconds, and not for less."""
-    script = Script(new()).to_final(-19.0)
+    script = Script(new(LIMITED)).to_final(-19.0)
     script.tick(-15.0, sigma=sigma, after=9.8)
     assert script.guidance.phase == Phase.FINAL
     script.tick(-14.0, sigma=sigma, after=0.4)
@@ -217,7 +222,7 @@ def test_go_around_on_uncertainty_that_lasts(sigma: float, broken_off: bool) -> 
 
 def test_only_uncertainty_across_the_axis_counts() -> None:
     """An error along the axis only changes when the vehicle arrives: a dock that faces east, uncertain east."""
-    guidance, axis = new(), math.pi / 2
+    guidance, axis = new(LIMITED), math.pi / 2
     for time, along in ((0.1, -250.0), (1.0, -190.0), (2.0, -15.0), (30.0, -10.0)):
         guidance._observe([fix(time, axis)])
         here = estimate(time, 0.0, along - NOSE, axis, sigma=0.1)
@@ -225,7 +230,8 @@ def test_only_uncertainty_across_the_axis_counts() -> None:
         update(guidance, time, here, axis, DOCK_DEPTH, False)
     assert guidance.phase == Phase.FINAL
     guidance._observe([fix(41.0, axis)])
-    here.covariance[0, 0], here.covariance[1, 1] = 25.0, 0.01
+    here = estimate(41.0, 0.0, along - NOSE, axis, sigma=0.1)
+    here.covariance[0, 0] = 25.0
     update(guidance, 41.0, here, axis, DOCK_DEPTH, False)
     assert guidance.phase == Phase.GO_AROUND
 
@@ -366,7 +372,7 @@ def test_go_around_keeps_clear_of_the_dock(side: float, drift: tuple[float, floa
     point = Point(-260.0 * math.cos(axis), -260.0 * math.sin(axis), axis, current)
     passage = run(point, axis, blind_until=-0.4, error=-side * 1.5)
     events = [(event.kind, event.text) for event in passage.guidance.events]
-    assert "entrance missed" in dict(events)["go_around"]
+    assert "miss" in dict(events)["go_around"]  # seen before the mouth or behind it
     assert passage.guidance.attempt == 2
     assert passage.clearance[Phase.GO_AROUND] > 2.0
     assert abs(passage.cross) < 0.05
@@ -374,7 +380,7 @@ def test_go_around_keeps_clear_of_the_dock(side: float, drift: tuple[float, floa
 
 def test_break_off_before_the_funnel_backs_out_first() -> None:
     """With less room than a turn needs before the dock, the vehicle goes astern until there is enough."""
-    script = Script(new()).to_final(-5.0)
+    script = Script(new(LIMITED)).to_final(-5.0)
     assert script.tick(-4.5, fixed=False, after=31.0).speed < 0.0
     assert script.guidance.phase == Phase.GO_AROUND
     room = CLEAR + SETTINGS.turning_radius

@@ -14,7 +14,7 @@ from auvsim.control.controller import Setpoints
 from auvsim.missions.docking.guidance import CLEAR, DockingSettings, Phase
 from auvsim.navigation.estimate import Estimate
 
-SETTINGS = DockingSettings()
+SETTINGS = DockingSettings(uncertain_timeout=10.0)
 SMALL = 0.01 * np.eye(2)  # covariance of a position [m2]
 
 

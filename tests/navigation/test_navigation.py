@@ -64,6 +64,7 @@ class Recorder:
     def __init__(self, yaw_rate: float = 0.0) -> None:
         self.ticks: list[SimpleNamespace] = []
         self.resets = 0
+        self.filter = SimpleNamespace(noise=DockingNoise())
         self._mean = np.array([1.0, 2.0, 0.3, 1.0, 0.1, yaw_rate, 0.2, -0.1])
 
     def reset(self) -> None:

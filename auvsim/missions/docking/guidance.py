@@ -2,96 +2,42 @@
 
 The law is line of sight with the crab angle taken from the estimated current. Where a cross current would turn the
 heading too far off the dock's axis for the funnel, the approach line is turned instead, so that it still runs through
-the entrance. Coordinates: dock frame, x along the course of a vehicle that enters, y to starboard, origin at the
-centre of the mouth.
+the entrance; where the current is strong, the vehicle goes faster. All of it is decided in the dock's frame, by the
+estimate without the estimated errors of compass and gauge: x along the course of a vehicle that enters, y to starboard,
+origin at the centre of the mouth.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from enum import IntEnum
-from typing import Any, ClassVar, Literal
+from collections.abc import Sequence
+from typing import Any, ClassVar
 
-from pydantic import Field
-
-from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
-from auvsim.base.settings import Settings
 from auvsim.control.controller import Setpoints
 from auvsim.data.log import VehicleLog
-from auvsim.data.variables import Variable
+from auvsim.missions.docking import path, speeds
+from auvsim.missions.docking.columns import COLUMNS, VARIABLES
+from auvsim.missions.docking.decisions import SoFar, above_or_below, not_ready, reason_to_break_off
+from auvsim.missions.docking.heard import Heard
 from auvsim.missions.docking.metrics import docking_metrics
+from auvsim.missions.docking.path import CLEAR
+from auvsim.missions.docking.relative import Locator, Relative
+from auvsim.missions.docking.settings import DockingSettings, Phase
+from auvsim.missions.docking.speeds import approach_course
+from auvsim.missions.docking.target import find_dock
 from auvsim.missions.line_of_sight import course_to_line, cross_track, heading_for_course
-from auvsim.missions.mission import Event, Metric, Mission, MissionSetup, Place, Situation
-from auvsim.navigation.estimate import Estimate
+from auvsim.missions.mission import Event, Mission, MissionSetup, Situation
 
-CLEAR = 4.0  # distance that the go-around keeps from the entrance [m]
-BESIDE = 3.0  # distance from the axis at which the vehicle would pass the dock [m]
+__all__ = ["CLEAR", "Docking", "DockingSettings", "Phase", "approach_course", "find_dock"]
+
 BACKING = 60.0  # longest time of backing out [s]
-ABEAM = (-5.0, 40.0)  # detour round the dock: along the axis and to either side of it [m]
-BEFORE = 40.0  # distance before the entrance from which the path to a gate is clear [m]
-
-
-class Phase(IntEnum):
-    """Phases of a docking trial, as logged."""
-
-    SEARCH = 0  # no fix yet: hold course and depth
-    HOMING = 1  # to the gate on the dock's axis
-    APPROACH = 2  # along the line to the entrance
-    FINAL = 3  # the last metres
-    DOCKED = 4  # the latch holds
-    GO_AROUND = 5  # back out and round for another attempt
-    ABORTED = 6  # given up
-
-
-class DockingSettings(Settings):
-    """Settings of docking: homing, approach, attempts and time limits."""
-
-    kind: Literal["docking"] = Field(
-        default="docking", description="docking, manoeuvre, track, or package.module:Class"
-    )
-    dock: str | None = Field(default=None, description="name of the structure to dock at; none: the only one")
-    homing_speed: float = Field(default=1.5, gt=0, description="speed through the water while homing to the gate [m/s]")
-    approach_speed: float = Field(default=1.0, gt=0, description="speed through the water on the approach [m/s]")
-    gate_distance: float = Field(default=200.0, gt=0, description="distance of the gate before the entrance [m]")
-    gate_radius: float = Field(default=20.0, gt=0, description="distance at which the gate counts as reached [m]")
-    retry_distance: float = Field(default=100.0, gt=0, description="distance of the gate of later attempts [m]")
-    turning_radius: float = Field(
-        default=16.0, gt=0, description="of the tightest turn, for the room to turn round before the dock [m]"
-    )
-    lookahead: float = Field(default=7.0, gt=0, description="lookahead of the line of sight [m]")
-    heading_limit_deg: float = Field(
-        default=20.0,
-        gt=0,
-        lt=60,
-        description="largest angle between heading and dock axis before the line is turned instead [deg]",
-    )
-    final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
-    attempts: int = Field(default=3, ge=1, le=1000, description="attempts before the vehicle gives up")
-    fix_timeout: float = Field(default=30.0, gt=0, description="time without a fix that breaks an approach off [s]")
-    uncertain_timeout: float = Field(
-        default=10.0,
-        gt=0,
-        description="time with an off-axis deviation above the mouth's radius after which it is broken off [s]",
-    )
-    lost_timeout: float = Field(default=180.0, gt=0, description="time without a fix that ends the trial [s]")
-
-
-def approach_course(axis: float, speed: float, current: tuple[float, float], limit: float) -> float:
-    """Course over ground of the approach line [rad]: the axis, or turned to keep the heading within `limit` of it.
-
-    Args:
-        axis: course of the dock's axis [rad].
-        speed: through the water [m/s].
-        current: north, east [m/s].
-        limit: largest angle between heading and axis [rad].
-    """
-    heading = heading_for_course(axis, speed, current)
-    offset = wrap(heading - axis)
-    if abs(offset) <= limit:
-        return axis
-    heading = axis + math.copysign(limit, offset)
-    return math.atan2(speed * math.sin(heading) + current[1], speed * math.cos(heading) + current[0])
+RETURNS = 2  # times that the vehicle goes back to a gate without an attempt being counted
+FASTER = 0.3  # by how much homing is faster than an approach in a strong current [m/s]
+UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
+STEADY = 0.05  # deviation of a current that counts as known [m/s]
+RUSH = 0.5  # by how much that may exceed the speed of homing [m/s]
+AGAIN = 0.2  # how much faster each further attempt is [m/s]
+HOPELESS = 0.1  # speed over ground that is none [m/s]
 
 
 class Docking(Mission):
@@ -103,66 +49,54 @@ class Docking(Mission):
 
     Settings = DockingSettings
     phases = tuple(phase.name.lower() for phase in Phase)
-    variables: ClassVar = {
-        "attempt": Variable((), "int8", "1", "number of the docking attempt, from 1"),
-        "along_track": Variable((), "float64", "m", "estimated distance along the dock axis, < 0 before", "dock"),
-        "cross_track": Variable((), "float64", "m", "estimated distance to starboard of the dock axis", "dock"),
-    }
-    columns: ClassVar = {
-        "docked": Metric("bool", "1", "whether it docked"),
-        "docked_first": Metric("bool", "1", "whether it docked on the first attempt"),
-        "failure_reason": Metric("str", "", "timeout, aborted or diverged; none if docked"),
-        "failure_text": Metric("str", "", "what the log says of it"),
-        "attempts": Metric("int", "1", "attempts to dock"),
-        "time": Metric("float", "s", "of docking, or of the end"),
-        "miss_distance": Metric("float", "m", "of the nose from the dock's axis where it first enters, last attempt"),
-        "cross_track": Metric("float", "m", "its part to starboard"),
-        "vertical": Metric("float", "m", "its part downward"),
-        "heading_error_deg": Metric("float", "deg", "heading less that of the dock, there"),
-        "contact_impulse": Metric("float", "N s", "contact impulse, friction included, until the latch held"),
-        "peak_contact_force": Metric(
-            "float", "N", "largest contact force, friction included, until then; as uncertain as the panels' stiffness"
-        ),
-        "docked_aligned": Metric("bool", "1", "whether it docked and lies within the dock's own limit of its axis"),
-        "final_along": Metric("float", "m", "of the nose behind the mouth, along the axis, at the end, if it docked"),
-        "final_cross": Metric("float", "m", "of the nose to starboard of the axis, then"),
-        "final_down": Metric("float", "m", "of the nose below the axis, then"),
-        "final_angle_deg": Metric("float", "deg", "between the vehicle's axis and the dock's, then"),
-    }
+    variables: ClassVar = VARIABLES
+    columns: ClassVar = COLUMNS
     aftermath = 5.0
 
     def __init__(self, setup: MissionSetup) -> None:
         super().__init__(setup)
         settings: DockingSettings = setup.settings
         self.dock = find_dock(settings.dock, setup.structures)
-        self._s, self._nose, self._vehicle = settings, setup.vehicle.nose, setup.name
+        self._s, self._vehicle = settings, setup.name
         assert self.dock is not None
         self._mouth_radius, self._latched = self.dock.structure.mouth_radius, self.dock.structure.latched
-        self._mouth = self.dock.pose.north, self.dock.pose.east
+        pose = self.dock.pose
+        self._locator = Locator((pose.north, pose.east), setup.vehicle.nose, setup.period)
         self._limit = math.radians(settings.heading_limit_deg)
+        self._fastest = speeds.fastest(setup.holds)
         self.phase = Phase.SEARCH
         self.attempt = 1
-        self.along = self.cross = math.nan  # of the estimate, dock frame [m]
-        self.axis = 0.0  # course of the dock's axis [rad], the mean of what the dock reported
-        self._axis_sum = (0.0, 0.0)
-        self._depth_sum, self._fixes = 0.0, 0
-        self._ranges = setup.ranges
-        if not setup.usbl:  # the dock lies as it is charted
-            self.axis, self._depth_sum, self._fixes = self.dock.pose.heading, self.dock.pose.depth, 1
-        self._last_fix = 0.0
+        self._here: Relative | None = None
+        self._reports = Heard(None if setup.usbl else (pose.heading, pose.depth), setup.ranges)
         self._certain = 0.0  # when the position across the axis was last known better than the mouth's radius
         self._hold: tuple[float, float] | None = None  # heading and depth held in search
-        self._north = self._east = math.nan  # of the nose, from the mouth [m]
-        self._current = (0.0, 0.0)  # north, east [m/s]
         self._side = 1.0  # on which the dock is passed: 1 to starboard of its axis
         self._leg = 1  # of the path to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
+        self._waits_for = ""  # what keeps the vehicle at a gate
+        self._returns = 0  # to a gate without an attempt counted
         self._phase_start = 0.0
+        self._nearest = (math.inf, 0.0)  # least distance to the gate [m] and when that was [s]
         self._occupant: str | None = None  # another vehicle in the dock, as reported in its packets
+
+    @property
+    def axis(self) -> float:
+        """Course of the dock's axis as the dock reports it [rad]."""
+        return self._reports.axis
 
     @property
     def dock_depth(self) -> float:
         """Depth of the mouth [m], the mean of what the dock reported."""
-        return self._depth_sum / max(self._fixes, 1)
+        return self._reports.depth
+
+    @property
+    def along(self) -> float:
+        """Estimated distance of the nose along the axis, negative before the mouth [m]; NaN before there is any."""
+        return self._here.along if self._here else math.nan
+
+    @property
+    def cross(self) -> float:
+        """Estimated distance of the nose to starboard of the axis [m]; NaN before there is any."""
+        return self._here.cross if self._here else math.nan
 
     @property
     def at_rest(self) -> bool:
@@ -175,12 +109,16 @@ class Docking(Mission):
         return self.attempt if self.phase in (Phase.APPROACH, Phase.FINAL) else None
 
     def row(self) -> tuple[Any, ...]:
-        """Attempt, distance along the dock's axis and across it, as estimated."""
-        return self.attempt, self.along, self.cross
+        """Values of `variables`."""
+        h = self._here
+        if h is None:
+            return (self.attempt, *(math.nan,) * 5)
+        return self.attempt, h.along, h.cross, h.below, h.cross_deviation, h.axis
 
     def overdue(self, duration: float) -> str:
-        """Says that it has not docked in time."""
-        return f"not docked within {duration:g} s"
+        """Says that it has not docked in time, and what it was doing."""
+        doing = f", waits at the gate: {self._waits_for}" if self._waits_for and self.phase != Phase.SEARCH else ""
+        return f"not docked within {duration:g} s{doing}"
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
@@ -189,169 +127,173 @@ class Docking(Mission):
 
     def _observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's reports among `readings`."""
-        for reading in readings:
-            if reading.sensor in self._ranges:
-                self._last_fix = max(self._last_fix, reading.received)
-            if reading.sensor == "usbl" and all(map(math.isfinite, reading.value.tolist())):
-                heading, depth = float(reading.value[3]), float(reading.value[6])
-                self._axis_sum = (self._axis_sum[0] + math.cos(heading), self._axis_sum[1] + math.sin(heading))
-                self.axis = math.atan2(self._axis_sum[1], self._axis_sum[0])
-                self._depth_sum += depth
-                self._fixes += 1
-                self._last_fix = max(self._last_fix, reading.received)
+        self._reports.observe(readings)
 
     def update(self, now: Situation) -> Setpoints:
         """The setpoints now."""
         self._observe(now.readings)
+        if now.estimate is not None:
+            self._reports.judge(now.estimate)
         for delivery in now.messages:
             if delivery.message.kind == "usbl" and delivery.message.payload.occupant not in (None, self._vehicle):
                 self._occupant = delivery.message.payload.occupant
         setpoints = self._decide(now)
+        self._locator.commanded(setpoints.speed)
         self.finished = self.phase in (Phase.DOCKED, Phase.ABORTED)
         return setpoints
 
     def _decide(self, now: Situation) -> Setpoints:
-        time, estimate, heading, depth = now.time, now.estimate, now.heading, now.depth
+        time, estimate, compass, gauge = now.time, now.estimate, now.heading, now.depth
         if self._hold is None:
-            self._hold = (heading, depth)
+            self._hold = (compass, gauge)
         if now.latched and self.phase != Phase.DOCKED:
             self._enter(Phase.DOCKED, time, "latched")
         if self.phase in (Phase.DOCKED, Phase.ABORTED):
-            return Setpoints(heading, depth, 0.0)
+            return Setpoints(compass, gauge, 0.0)
         if self._occupant is not None:
-            self._enter(Phase.ABORTED, time, f"the dock is occupied by '{self._occupant}'")
-            return Setpoints(heading, depth, 0.0)
-        silence = time - self._last_fix
-        if silence > self._s.lost_timeout:
-            self._enter(Phase.ABORTED, time, f"no fix for {silence:.0f} s")
-            return Setpoints(heading, depth, 0.0)
-        if estimate is None or not estimate.initialised or not self._fixes:
+            return self._abort(now, f"the dock is occupied by '{self._occupant}'")
+        if self._reports.silence(time) > self._s.lost_timeout:
+            return self._abort(now, self._reports.lost(time))
+        if estimate is None or not estimate.initialised or not self._reports.count:
             return Setpoints(*self._hold, self._s.approach_speed)
-        self._locate(time, estimate, heading)
+        here = self._locator.locate(time, estimate, compass, gauge, self._reports.axis, self._reports.depth)
+        self._here = here
         if self.phase == Phase.SEARCH:
             self._enter(Phase.HOMING, time, "first fix")
-            self._side = math.copysign(1.0, self.cross)
-        if self.phase == Phase.HOMING:
-            return self._to_gate(time, -self._s.gate_distance, 0.0)
-        if self.phase == Phase.GO_AROUND:
-            return self._go_around(time, wrap(heading - self.axis))
-        reason = self._reason_to_break_off(time, estimate, silence)
-        return self._break_off(time, reason, wrap(heading - self.axis)) if reason else self._follow_line()
-
-    def _locate(self, time: float, estimate: Estimate, heading: float) -> None:
-        """The nose now, by dead reckoning from the last estimate."""
-        north, east, _ = estimate.position.tolist()
-        u, v, _ = estimate.velocity.tolist()
-        current_north, current_east = estimate.current.tolist()
-        cos, sin, dt = math.cos(heading), math.sin(heading), time - estimate.time
-        north = north + (u * cos - v * sin + current_north) * dt + self._nose * cos - self._mouth[0]
-        east = east + (u * sin + v * cos + current_east) * dt + self._nose * sin - self._mouth[1]
-        cos, sin = math.cos(self.axis), math.sin(self.axis)
-        self.along = north * cos + east * sin
-        self.cross = east * cos - north * sin
-        self._north, self._east, self._current = north, east, (current_north, current_east)
+            self._side = math.copysign(1.0, here.cross)
+        if self.phase in (Phase.HOMING, Phase.GO_AROUND):
+            heading, depth, speed, rudder = self._homing(time, here)
+        else:
+            reason = self._reason_to_break_off(time, here)
+            heading, depth, speed, rudder = self._break_off(time, here, reason) if reason else self._follow_line(here)
+        # What compass and gauge will show when it is so.
+        return Setpoints(wrap(heading + here.compass_bias), depth + here.depth_bias, speed, rudder)
 
     def _enter(self, phase: Phase, time: float, reason: str) -> None:
         self.events.append(Event(time, phase.name.lower(), reason))
-        self.phase, self._phase_start = phase, time
+        self.phase, self._phase_start, self._nearest = phase, time, (math.inf, time)
 
-    def _to(self, x: float, y: float) -> Setpoints:
-        """Straight to a point of the dock frame, crabbing against the current."""
-        axis, speed = self.axis, self._s.homing_speed
-        target_north = x * math.cos(axis) - y * math.sin(axis)
-        target_east = x * math.sin(axis) + y * math.cos(axis)
-        course = math.atan2(target_east - self._east, target_north - self._north)
-        return Setpoints(heading_for_course(course, speed, self._current), self.dock_depth, speed)
+    def _abort(self, now: Situation, reason: str) -> Setpoints:
+        self._enter(Phase.ABORTED, now.time, reason)
+        return Setpoints(now.heading, now.depth, 0.0)
 
-    def _to_gate(self, time: float, x: float, y: float) -> Setpoints:
-        """To a gate of the dock frame, from beside or behind the dock first round it."""
-        abeam_x, abeam_y = ABEAM[0], self._side * ABEAM[1]
-        if self.along < -BEFORE or math.hypot(self.along - abeam_x, self.cross - abeam_y) < 15.0:
+    def _speed(self, here: Relative) -> float:
+        """Speed through the water on an approach: the set one, or what the current asks for [m/s].
+
+        The way on which line of sight takes an error back does not depend on speed, the time does: the less steady the
+        current and the more attempts it has foiled, the faster.
+        """
+        s = self._s
+        unsteady = UNSTEADY_GAIN * max(here.unsteadiness - STEADY, 0.0) + AGAIN * (self.attempt - 1)
+        least = min(s.approach_speed + unsteady, max(s.homing_speed, s.approach_speed) + RUSH)
+        crab = math.radians(s.crab_limit_deg)
+        return speeds.speed_through_water(least, here.axis, here.current, s.ground_speed, crab, self._fastest)
+
+    def _homing_speed(self, here: Relative) -> float:
+        s = self._s
+        needed = self._speed(here)
+        faster = needed + FASTER if needed > s.approach_speed else needed
+        return min(max(s.homing_speed, faster, math.hypot(*here.current) + s.ground_speed), self._fastest)
+
+    def _line(self, here: Relative) -> float:
+        """Course of the approach line [rad]."""
+        return approach_course(here.axis, self._speed(here), here.current, self._limit)
+
+    def _homing(self, time: float, here: Relative) -> Setpoints:
+        """To the gate; on a go-around first back out of the funnel, then to a gate beside the line."""
+        s, retry = self._s, self.phase == Phase.GO_AROUND
+        if retry and self._leg == 0:
+            if time - self._phase_start < BACKING and not self._has_room(here):
+                return Setpoints(here.axis, self.dock_depth, -0.8 * s.approach_speed)
+            self._leg = 1
+        distance = s.retry_distance if retry else s.gate_distance
+        aside = 0.5 * self._side * path.ABEAM[1] if retry else 0.0
+        gate = path.on_line(-distance, aside, wrap(self._line(here) - here.axis))
+        return self._to_gate(time, here, gate, distance)
+
+    def _to_gate(self, time: float, here: Relative, gate: tuple[float, float], distance: float) -> Setpoints:
+        """To a gate of the dock frame, from beside or behind the dock first round it; held there until all is ready."""
+        speed = self._homing_speed(here)
+        abeam = path.ABEAM[0], self._side * path.ABEAM[1]
+        if here.along < -path.BEFORE or math.hypot(here.along - abeam[0], here.cross - abeam[1]) < 15.0:
             self._leg = 2
         if self._leg == 1:
-            return self._to(abeam_x, abeam_y)
-        if math.hypot(self.along - x, self.cross - y) < self._s.gate_radius:
-            self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
-        return self._to(x, y)
+            return self._on_course(here, path.course_to(here, abeam), speed)
+        away = math.hypot(here.along - gate[0], here.cross - gate[1])
+        if self._waits_for or away < self._s.gate_radius:
+            self._waits_for = not_ready(here, distance, self._s) or ""
+            if not self._waits_for and away < 2.0 * self._s.gate_radius:
+                hopeless = self._too_strong(here)
+                if hopeless:
+                    self._enter(Phase.ABORTED, time, hopeless)
+                    return Setpoints(here.heading, self.dock_depth, 0.0)
+                self._enter(Phase.APPROACH, time, f"gate reached, attempt {self.attempt}")
+            elif self._waits_for:
+                return self._on_course(here, path.orbit(here, gate, self._side), speed)
+        elif not self._comes_nearer(time, away):
+            self._enter(Phase.ABORTED, time, self._too_strong(here) or f"no progress, {away:.0f} m from the gate")
+            return Setpoints(here.heading, self.dock_depth, 0.0)
+        return self._on_course(here, path.course_to(here, gate), speed)
 
-    def _follow_line(self) -> Setpoints:
-        """Along the approach line, by line of sight."""
-        speed = self._s.approach_speed
-        line = approach_course(self.axis, speed, self._current, self._limit)
-        # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
-        error = cross_track(line, self._north, self._east)
-        course = course_to_line(line, error, self._s.lookahead)
-        return Setpoints(heading_for_course(course, speed, self._current), self.dock_depth, speed)
+    def _on_course(self, here: Relative, course: float, speed: float) -> Setpoints:
+        return Setpoints(heading_for_course(course, speed, here.current), self.dock_depth, speed)
 
-    def _reason_to_break_off(self, time: float, estimate: Estimate, silence: float) -> str | None:
-        """What is wrong with this attempt; enters the last metres when they begin."""
-        s = self._s
-        (north, both), (_, east) = estimate.horizontal_covariance.tolist()
-        cos, sin = math.cos(self.axis), math.sin(self.axis)
-        variance = sin * sin * north - 2 * sin * cos * both + cos * cos * east  # across the axis
-        if variance <= self._mouth_radius**2:
-            self._certain = time
-        if self.phase == Phase.APPROACH and self.along > -s.final_distance:
-            self._enter(Phase.FINAL, time, f"{-self.along:.0f} m before the entrance, {self.cross:+.2f} m off the axis")
-        if silence > s.fix_timeout:
-            return f"no fix for {silence:.0f} s"
-        if self.phase != Phase.FINAL:
+    def _comes_nearer(self, time: float, away: float) -> bool:
+        if away < self._nearest[0] - 5.0:
+            self._nearest = (away, time)
+        return time - self._nearest[1] <= self._s.progress_timeout
+
+    def _too_strong(self, here: Relative) -> str | None:
+        """That the vehicle is too slow for the current on the approach line; None if it is not."""
+        along = speeds.ground_speed_along(self._line(here), self._fastest, here.current)
+        if along > HOPELESS:
             return None
-        if time - self._certain > s.uncertain_timeout:
-            return f"off-axis position uncertain by more than the mouth's radius for {time - self._certain:.0f} s"
-        if self.along > -0.5 and abs(self.cross) > self._mouth_radius + 0.5:
-            return f"entrance missed by {abs(self.cross):.2f} m"
-        if self.along > self._latched + 1.5:
-            return "entrance passed without capture"
-        patience = 3.0 * (s.final_distance + self._latched) / s.approach_speed
-        if time - self._phase_start > patience:
-            return f"not captured within {patience:.0f} s of the last metres"
-        return None
+        current = math.hypot(*here.current)
+        return f"current too strong for this vehicle: {current:.2f} m/s, it makes {self._fastest:.2f} m/s"
 
-    def _break_off(self, time: float, reason: str, off: float) -> Setpoints:
-        """Ends an attempt at a heading `off` the axis [rad]."""
-        if self.attempt >= self._s.attempts:
+    def _follow_line(self, here: Relative) -> Setpoints:
+        """Along the approach line, by line of sight."""
+        speed, line = self._speed(here), self._line(here)
+        # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
+        error = cross_track(line, here.north, here.east)
+        return self._on_course(here, course_to_line(line, error, self._s.lookahead), speed)
+
+    def _reason_to_break_off(self, time: float, here: Relative) -> str | None:
+        """What is wrong with this attempt; enters the last metres when they begin."""
+        if here.cross_deviation <= self._mouth_radius or self.phase != Phase.FINAL:
+            self._certain = time
+        begins = self.phase == Phase.APPROACH and here.along > -self._s.final_distance
+        if begins and here.cross_deviation > self._mouth_radius and self._returns < RETURNS:
+            return f"off-axis position uncertain by {here.cross_deviation:.1f} m"
+        if begins:
+            text = f"{-here.along:.0f} m before the entrance, {here.cross:+.2f} m off the axis, "
+            self._enter(Phase.FINAL, time, text + above_or_below(here.below))
+        final = self.phase == Phase.FINAL
+        so_far = SoFar(
+            silence=self._reports.silence(time), uncertain=time - self._certain,
+            final=time - self._phase_start if final else None, last=self.attempt >= self._s.attempts,
+        )  # fmt: skip
+        return reason_to_break_off(here, so_far, self._s, self._mouth_radius, self._latched)
+
+    def _break_off(self, time: float, here: Relative, reason: str) -> Setpoints:
+        """Ends an attempt; before the last metres it does not count as one."""
+        self._side = math.copysign(1.0, here.cross)
+        if self.phase == Phase.APPROACH and self._returns < RETURNS:
+            self._returns += 1
+            self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} anew")
+        elif self.attempt >= self._s.attempts:
             self._enter(Phase.ABORTED, time, f"{reason}; attempt {self.attempt} was the last")
-            return Setpoints(self.axis, self.dock_depth, 0.0)
-        self.attempt += 1
-        self._side = math.copysign(1.0, self.cross)
-        self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} follows")
+            return Setpoints(here.axis, self.dock_depth, 0.0)
+        else:
+            self.attempt += 1
+            self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} follows")
         # In or close before the funnel back out first; beside or behind it, or far off, go round at once.
         room = -CLEAR - self._s.turning_radius
-        self._leg = 0 if room < self.along < self._latched + 0.5 and abs(self.cross) < BESIDE else 1
-        return self._go_around(time, off)
+        in_the_way = room < here.along < self._latched + 0.5 and abs(here.cross) < path.BESIDE
+        self._leg = 0 if in_the_way else 1
+        return self._homing(time, here)
 
-    def _go_around(self, time: float, off: float) -> Setpoints:
-        """Back out of the funnel, then round to a gate abeam of the axis."""
-        s = self._s
-        if self._leg == 0:
-            if time - self._phase_start < BACKING and not self._has_room(off):
-                return Setpoints(self.axis, self.dock_depth, -0.8 * s.approach_speed)
-            self._leg = 1
-        return self._to_gate(time, -s.retry_distance, 0.5 * self._side * ABEAM[1])
-
-    def _has_room(self, off: float) -> bool:
-        """Whether a vehicle at a heading `off` the axis [rad] can turn before the dock, and to which side.
-
-        A torpedo cannot be steered astern for long: the farther it has turned off, the less room it needs.
-        """
-        radius = self._s.turning_radius
-        self._side = math.copysign(1.0, self.cross + radius * math.sin(off))
-        turned = max(-math.pi / 2, min(math.pi / 2, self._side * off))
-        return abs(self.cross) > radius or self.along < -CLEAR - radius * (1.0 - math.sin(turned))
-
-
-def find_dock(name: str | None, structures: Mapping[str, Place]) -> Place:
-    """The structure of a name, or the only one.
-
-    Raises:
-        InputError: there is none of that name; none at all; or several, and none is named.
-    """
-    if name is not None:
-        if name not in structures:
-            raise unknown_name("structure", name, list(structures))
-        return structures[name]
-    if len(structures) != 1:
-        known = f"name one of {', '.join(structures)}" if structures else "there is no structure"
-        raise InputError(f"mission docking: no dock is given; {known}")
-    return next(iter(structures.values()))
+    def _has_room(self, here: Relative) -> bool:
+        """Whether the vehicle can turn before the dock; sets to which side."""
+        self._side, free = path.room_to_turn(here, self._s.turning_radius)
+        return free

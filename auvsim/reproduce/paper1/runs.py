@@ -135,7 +135,7 @@ def track(run: Run, docking_filter: Any, **options: Any) -> Track:
     estimate = None
     for k, estimate in enumerate(follow(run, DockingEstimator(docking_filter, run.usbl, step=TICK, **options))):
         if estimate.initialised:
-            means[k], covariances[k] = estimate.mean, estimate.covariance
+            means[k], covariances[k] = estimate.mean[:8], estimate.covariance[:8, :8]
     return Track(means=means, covariances=covariances, refused=dict(estimate.refused) if estimate else {})
 
 
