@@ -101,7 +101,9 @@ def test_verdicts_see_a_wrong_order_and_a_bad_choice(study):
     assert all(v.met for v in acceptance.verdicts(study) if v.row == acceptance.RECURSION)
     errors = np.array([[3.0, 4.0], [0.0, 5.0], [5.0, 0.0]])
     results = {key: runs_with(size * errors) for key, size in (("dr", 4.0), ("ekf", 3.0), ("dekf", 2.5), ("iiru", 2.0))}
-    more = {key: runs_with(errors) for key in ("sc", "rt", "oracle")} | {"choosing": runs_with(1.2 * errors)}
+    more = {
+        key: runs_with(size * errors) for key, size in (("sc", 1.0), ("rt", 1.1), ("oracle", 1.0), ("choosing", 1.2))
+    }
     changed = replace(study, results={"paper_process_weave": results | more})
     found = {v.quantity: v for v in acceptance.verdicts(changed)}
     assert found["ekf / iiru"].measured == pytest.approx(1.5)
