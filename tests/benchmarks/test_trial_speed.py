@@ -114,7 +114,7 @@ def test_truth_and_sensors(benchmark, report, recording: Recording) -> None:
             simulation.world.truth(agent.name)
             agent.sense(tick, now, simulation.world, simulation.log)
             simulation.network.poll({agent.name: previous}, {agent.name: now})
-            agent.receive(simulation.network.deliver(agent.name, now.time))
+            agent.receive(simulation.network.deliver(agent.name, now.time), now.time, simulation.log)
             count += len(agent._readings)
         return count
 
