@@ -147,7 +147,10 @@ def test_one_trial_again(
 @pytest.mark.parametrize(
     ("pins", "text"),
     [
-        ({"estimator": {"kind": "no.where:factory"}}, "variant 'b': estimator 'no.where:factory': ModuleNotFound"),
+        (
+            {"estimator": {"kind": "no.where:factory"}},
+            "variant 'b': vehicles.remus100.estimator: estimator 'no.where:factory': ModuleNotFound",
+        ),
         ({"vehicle": {"model": "remus"}}, "no vehicle 'remus'; there are "),
         ({"vehicle": {"start": {"depth": 100.0}}}, "vehicle.start.depth: 100 m is not between"),
     ],
