@@ -47,6 +47,10 @@ class CommandedAgent:
     def receive(self, *_: Any) -> None:
         """Receives no messages."""
 
+    def outgoing(self) -> list[Any]:
+        """Sends nothing."""
+        return []
+
     def navigate(self, *_: Any) -> None:
         """Knows nothing."""
 

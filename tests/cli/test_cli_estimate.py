@@ -34,18 +34,18 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_estimators_side_by_side_on_a_trial(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     """One table, one page, a log for each estimator; the trial's own is what it was."""
     out = tmp_path / "out"
-    arguments = ["estimate", str(folder / "trial.nc"), "--estimator", "augmented_ekf", "paper", "--out", str(out)]
+    arguments = ["estimate", str(folder / "trial.nc"), "--estimator", "robust", "paper", "--out", str(out)]
     assert main(arguments) == 0
     shown = capsys.readouterr().out
     assert "NEES/dof" in shown
     assert "usbl" in shown
     assert sorted(path.name for path in out.iterdir()) == [
-        "estimators.csv", "trial.augmented_ekf.nc", "trial.paper.nc", "trial.png",
+        "estimators.csv", "trial.paper.nc", "trial.png", "trial.robust.nc",
     ]  # fmt: skip
-    assert logs.differences(logs.read(folder / "trial.nc"), logs.read(out / "trial.augmented_ekf.nc")) == []
+    assert logs.differences(logs.read(folder / "trial.nc"), logs.read(out / "trial.robust.nc")) == []
     with (out / "estimators.csv").open() as file:
         rows = list(csv.DictReader(file))
-    assert {row["estimator"] for row in rows} == {"augmented_ekf", "paper"}
+    assert {row["estimator"] for row in rows} == {"robust", "paper"}
     assert all(float(row["position_rms_m"]) > 0.0 for row in rows)
 
 

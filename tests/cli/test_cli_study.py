@@ -43,7 +43,10 @@ def test_help_tells_the_options(name: str, capsys: pytest.CaptureFixture) -> Non
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["docing"], "no study 'docing'; there are comparison, docking, held_out, identification, identified_docking"),
+        (
+            ["docing"],
+            "no study 'docing'; there are comparison, docking, envelope, formation, held_out, identification, identified_docking, time_steps",
+        ),
         (["docking", "--trails", "3"], "Unrecognized options: --trails, 3; see auvsim study docking --help"),
         (["docking", "--trials", "x"], "invalid literal for int() with base 10: 'x'"),
         (["docking", "--trials", "0"], "--trials 0 must be 1 or more"),

@@ -85,7 +85,10 @@ def test_divergence_is_diagnosed(
         (["--vehicle.model", "broken.xml"], "command line: vehicle.model: model broken.xml: "),
         (["--vehicle.model", "none.xml"], "command line: vehicle.model: model none.xml: "),
         (["--dock.model", "remus100"], "command line: dock.model: model remus100 lacks "),
-        (["--estimator", "kalman"], "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm"),
+        (
+            ["--estimator", "kalman"],
+            "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm, imm_biased, robust",
+        ),
         (
             ["--estimator", "nowhere:factory"],
             "command line: estimator: estimator 'nowhere:factory': ModuleNotFoundError",

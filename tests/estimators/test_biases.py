@@ -105,8 +105,8 @@ def test_a_bias_is_found_on_a_circle(name, conditions, truth):
     deviation = math.sqrt(belief.covariance[8, 8])
     assert abs(belief.mean[8] - truth) < 4.0 * deviation  # missed once in 16 000 if the covariance is right
     assert deviation < 0.25 * abs(truth)  # and it is found, not only believed possible
-    assert estimate.mean.shape == (8,)
-    assert estimate.covariance.shape == (8, 8)
+    assert estimate.mean.tolist() == belief.mean.tolist()  # the bias is a state of the estimate, too
+    assert estimate.covariance.shape == (9, 9)
 
 
 def test_a_filter_that_is_told_of_its_biases_is_the_filter_without():

@@ -125,7 +125,7 @@ def test_poses_of_fifteen_seconds_ago_are_better_known_now(docking_filter):
             if k >= 230 and k % 10 == 0:
                 then = k - 30  # 15 s ago
                 belief = dict(estimator.smoothed())[run.times[then]]
-                filtered.append(np.sum((delivered[then].mean - run.states[then])[:2] ** 2))
+                filtered.append(np.sum((delivered[then].mean[:8] - run.states[then])[:2] ** 2))
                 smoothed.append(np.sum((belief.mean[:8] - run.states[then])[:2] ** 2))
                 normalised.append(nees(belief.mean[:2], belief.covariance[:2, :2], run.states[then, :2]))
     assert len(smoothed) > 150

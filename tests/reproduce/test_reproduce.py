@@ -169,7 +169,7 @@ def test_every_row_has_something_to_reach(study):
         (["paper1", "--seed", "one"], "seed"),
         (["paper1", "--runs", "3"], "--runs"),
         (["paper1", "--truth", "real"], "mujoco"),
-        (["paper3"], "paper1"),
+        (["paper9"], "paper1"),
         ([], "reproduce"),
     ],
 )

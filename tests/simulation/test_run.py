@@ -386,7 +386,7 @@ def funnel_clearance(trial: VehicleLog) -> np.ndarray:
 
 
 @pytest.mark.parametrize("angle", [90.0, -90.0])
-@pytest.mark.parametrize("start", [148.0, 156.0])
+@pytest.mark.parametrize("start", [114.0, 126.0])
 def test_goes_around_when_the_current_turns_before_the_dock(start: float, angle: float) -> None:
     """A following current of 0.5 m/s that turns across in the last metres: missed, seen, round, docked."""
     trial = run(
@@ -401,7 +401,7 @@ def test_goes_around_when_the_current_turns_before_the_dock(start: float, angle:
     assert found.docked
     assert found.attempts == 2
     (reason,) = [text for kind, text in events(trial) if kind == "go_around"]
-    assert reason.startswith("entrance ")
+    assert reason.startswith(("would miss the entrance by ", "entrance passed "))
     assert reason.endswith("; attempt 2 follows")
     # From the break-off on, no nearer than it already was (beside the dock), and without touching it.
     around = phase_at(trial, trial["truth"]["time"]) == Phase.GO_AROUND
@@ -410,8 +410,8 @@ def test_goes_around_when_the_current_turns_before_the_dock(start: float, angle:
     assert not (phase_at(trial, trial["contact"]["time"]) == Phase.GO_AROUND).any()
 
 
-def test_gives_up_when_the_dock_says_it_is_elsewhere() -> None:
-    """A dock whose depth gauge is metres wrong: three passes above or below it, aborted, with the reason."""
+def test_a_dock_whose_gauge_is_metres_wrong_is_met_all_the_same() -> None:
+    """The downward part of the fixes says where the dock is, whatever depth it reports of itself."""
     trial = run(
         2,
         sensors={"usbl": {"dock_depth_bias": 6.0}},
@@ -420,10 +420,8 @@ def test_gives_up_when_the_dock_says_it_is_elsewhere() -> None:
     reported = trial["usbl"]["value"][:, 6].mean() - 20.0
     assert 2.5 < abs(reported) < 15.0  # this seed's draw: clear of the dock, in the water
     found = summarise(trial)
-    assert (found.docked, found.attempts, found.failure_reason) == (False, 3, "aborted")
-    assert found.failure_text == "entrance passed without capture; attempt 3 was the last"
-    assert [kind for kind, _ in events(trial)].count("go_around") == 2
-    assert len(trial["contact"]["time"]) == 0
+    assert (found.docked, found.attempts) == (True, 1)
+    assert abs(found.vertical) < 0.5
 
 
 MEMORY = """

@@ -4,7 +4,7 @@ Coordinates: dock frame, x along the course of a vehicle that enters, y to starb
 """
 
 import math
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -52,7 +52,8 @@ class HoveringDocking(Mission):
     """
 
     Settings = HoveringDockingSettings
-    phases, variables, columns = Docking.phases, Docking.variables, Docking.columns
+    phases, columns = Docking.phases, Docking.columns
+    variables: ClassVar = dict(list(Docking.variables.items())[:3])  # attempt, along_track, cross_track
     aftermath = Docking.aftermath
 
     def __init__(self, setup: MissionSetup) -> None:

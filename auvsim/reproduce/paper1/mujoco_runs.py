@@ -124,8 +124,8 @@ def track(run: RunRecord, navigator: Navigator) -> Track:
     for k, tick in enumerate(run.ticks):
         estimate = navigator.update(tick.time, tick.readings, (), tick.commands)
         if estimate.initialised:
-            means[k] = estimate.state
-            covariances[k] = estimate.covariance
+            means[k] = estimate.state[:8]  # biases may follow
+            covariances[k] = estimate.covariance[:8, :8]
     return Track(means=means, covariances=covariances, refused=dict(estimate.reasons) if estimate else {})
 
 
