@@ -87,7 +87,7 @@ def test_divergence_is_diagnosed(
         (["--dock.model", "remus100"], "command line: dock.model: model remus100 lacks "),
         (
             ["--estimator", "kalman"],
-            "command line: estimator: no kind 'kalman'; there are augmented_ekf, ukf, imm, imm_biased, robust",
+            "command line: estimator: no kind 'kalman'; there are robust, augmented_ekf, ukf, imm",
         ),
         (
             ["--estimator", "nowhere:factory"],
