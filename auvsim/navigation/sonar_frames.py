@@ -1,9 +1,10 @@
 """From an imaging sonar's intensities to frames that the estimators of `map_path` compare: on the level, standardised.
 
-A sonar measures slant ranges, and echoes that fall with range and have the speckle of one look. The estimators take
-frames for maps of a level floor in white noise of one size. So each beam is laid on the floor by the altitude, each
-range divided by its mean over the beams, averaged over cells (which takes most of the speckle out), and of the
-logarithm of that each ring of ranges has its mean removed and is divided by its spread.
+A sonar measures slant ranges, and echoes that fall with range and have speckle. The estimators take a frame for a map of
+a level floor in white noise of one size. So each beam is laid on the floor by the altitude, each range is divided by its
+mean over the beams, and intensities are averaged over cells, which takes out most of the speckle. Of their logarithm the
+mean of the surroundings is removed, since broad light and shade partly go with the vehicle and would pull matches to no
+motion; then each ring of ranges is given mean 0 and variance 1.
 """
 
 import math
@@ -11,12 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 from auvsim.base.frames import Array
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame, to_sector
 
+SURROUNDINGS = 1.0  # standard deviation of the Gaussian over which their mean is taken [m]
 RING = 1.0  # width of the rings that are standardised [m]
-LEAST = 1e-3  # intensity by the mean of its ring below which the logarithm is cut
+LEAST = 1e-3  # intensity by the mean of its range below which the logarithm is cut
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,7 +42,8 @@ class SectorFrames:
         level /= np.maximum(level.mean(axis=0), 1e-300)
         cells = to_sector(level, self._floor, self.grid)[self.grid.seen]
         image = np.zeros(self.grid.shape)
-        image[self.grid.seen] = self._standardised(np.log(np.maximum(cells, LEAST)), altitude)
+        image[self.grid.seen] = np.log(np.maximum(cells, LEAST))
+        image[self.grid.seen] = self._standardised(self._detailed(image)[self.grid.seen], altitude)
         return SonarFrame(stamp=stamp, intensity=image, geometry=self.grid, sequence=sequence)
 
     def _on_the_floor(self, intensity: Array, altitude: float) -> Array:
@@ -50,6 +54,12 @@ class SectorFrames:
         before = np.minimum(at.astype(int), len(slant) - 2)
         share = at - before
         return intensity[:, before] * (1.0 - share) + intensity[:, before + 1] * share
+
+    def _detailed(self, image: Array) -> Array:
+        """An image (rows, columns) without the mean of each cell's surroundings, of the cells that are seen."""
+        width = SURROUNDINGS / self.grid.cell
+        shares = np.maximum(gaussian_filter(self.grid.seen.astype(float), width), 1e-12)
+        return image - gaussian_filter(image, width) / shares
 
     def _standardised(self, values: Array, altitude: float) -> Array:
         """Values of the cells that are seen, each ring's of mean 0 and variance 1; 0 beyond the sonar's ranges."""

@@ -17,7 +17,7 @@ from auvsim.water.terrain import Terrain
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame
 
 DEPTH = 20.0  # of the floor on average [m]
-ALTITUDE = 3.0  # of the vehicle above that, on one depth [m]
+ALTITUDE = 5.0  # of the vehicle above that, on one depth; the sonar's SNR is as of it [m]
 SPACING = 0.1  # of the floor's points [m]
 BESIDE = 22.0  # floor beside the path [m]
 MAXIMUM_RANGE = 21.0  # slant, to the end of the frames' sector [m]

@@ -76,13 +76,13 @@ def simulate(conditions: Conditions, seed: int, motion: tuple[Input, ...] | None
     low, high = poses[:, :2].min(axis=0) - 25.0, poses[:, :2].max(axis=0) + 25.0
     features = place.uniform(low, high, (place.poisson(conditions.density * np.prod(high - low)), 2))
     if conditions.frames == "floor":
-        frames = floor_frames(
-            poses, GRID, rocks=conditions.density, snr=conditions.snr, seed=seed, generator=noise
-        )
+        frames = floor_frames(poses, GRID, rocks=conditions.density, snr=conditions.snr, seed=seed, generator=noise)
     else:
         render = _array_frame if conditions.frames == "array" else point_frame
         frames = tuple(
-            SonarFrame(stamp=float(k), intensity=render(features, pose, conditions.snr, noise), geometry=GRID, sequence=k)
+            SonarFrame(
+                stamp=float(k), intensity=render(features, pose, conditions.snr, noise), geometry=GRID, sequence=k
+            )
             for k, pose in enumerate(poses)
         )
     if conditions.bad_frames:
