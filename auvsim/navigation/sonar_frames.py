@@ -1,10 +1,10 @@
 """From an imaging sonar's intensities to frames that the estimators of `map_path` compare: on the level, standardised.
 
-A sonar measures slant ranges, and echoes that fall with range and have speckle. The estimators take a frame for a map of
-a level floor in white noise of one size. So each beam is laid on the floor by the altitude, each range is divided by its
-mean over the beams, and intensities are averaged over cells, which takes out most of the speckle. Of their logarithm the
-mean of the surroundings is removed, since broad light and shade partly go with the vehicle and would pull matches to no
-motion; then each ring of ranges is given mean 0 and variance 1.
+A sonar measures slant ranges, and echoes that fall with range and have speckle. The estimators take a frame for a map
+of a level floor in white noise of one size. So each beam is laid on the floor by the altitude, each range is divided by
+its mean over the beams, and intensities are averaged over cells, which takes out most of the speckle. Of their
+logarithm the mean of the surroundings is removed, since broad light and shade partly go with the vehicle and would pull
+matches to no motion; then each ring of ranges is given mean 0 and variance 1.
 """
 
 import math
@@ -19,6 +19,7 @@ from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame, to_sec
 
 SURROUNDINGS = 1.0  # standard deviation of the Gaussian over which their mean is taken [m]
 RING = 1.0  # width of the rings that are standardised [m]
+BLANK = 1e-9  # spread of a ring below which it shows nothing
 LEAST = 1e-3  # intensity by the mean of its range below which the logarithm is cut
 
 
@@ -67,8 +68,9 @@ class SectorFrames:
         counts = np.maximum(np.bincount(ring), 1)
         values = values - (np.bincount(ring, values) / counts)[ring]
         spread = np.sqrt(np.bincount(ring, values**2) / counts)[ring]
-        heard = (slant >= self.polar.ranges[0]) & (slant <= self.polar.ranges[-1]) & (spread > 0.0)
-        return np.where(heard, values / np.where(spread > 0.0, spread, 1.0), 0.0)
+        heard = (slant >= self.polar.ranges[0]) & (slant <= self.polar.ranges[-1])
+        blank = spread < BLANK  # not where it is not finite: that is to be seen
+        return np.where(heard & ~blank, values / np.where(blank, 1.0, spread), 0.0)
 
     @cached_property
     def _floor(self) -> PolarGrid:
