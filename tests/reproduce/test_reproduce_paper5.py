@@ -144,11 +144,21 @@ def test_more_noise_hides_the_floor():
     assert abs(agreement(*(f.intensity for f in faint))) < 0.1  # three deviations
 
 
+def test_rocks_are_bright():
+    brightest = []
+    for rocks in (0.0, 0.1):
+        frames = floor_frames(np.zeros((1, 3)), GRID, rocks=rocks, snr=6.0, seed=3, generator=np.random.default_rng(4))
+        brightest.append(np.sort(frames[0].intensity, axis=None)[-20:].mean())
+    assert brightest[1] > 1.2 * brightest[0]
+
+
 def test_ray_cast_runs_are_paired_with_the_others():
     ray_cast = simulate(arc(replace(paper5.ROUGH, duration=2)), 8)
     point = simulate(arc(Conditions(duration=2)), 8)
     np.testing.assert_array_equal(ray_cast.poses, point.poses)
     assert ray_cast.inputs == point.inputs
+    rocky = simulate(arc(replace(paper5.ROCKS, duration=2)), 8)
+    assert agreement(ray_cast.frames[0].intensity, rocky.frames[0].intensity) < 0.95
     model = frame_model(ray_cast.conditions)
     features = model.density * math.pi * model.point_spread**2 * model.amplitude**2
     # Frames are standardised; a tenth of their variance is taken for the floor's.

@@ -10,10 +10,9 @@ from auvsim.base.frames import Array, euler_to_quaternion
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.physics.truth import Truth
 from auvsim.sensors.imaging_sonar import ImagingSonar, ImagingSonarSettings
-from auvsim.water import seabed
 from auvsim.water.currents import CurrentField, Uniform
 from auvsim.water.seabed import SeabedSettings
-from auvsim.water.terrain import Terrain
+from auvsim.water.terrain import Terrain, build_terrain
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame
 
 DEPTH = 20.0  # of the floor on average [m]
@@ -62,7 +61,7 @@ def floor_frames(
     settings = SeabedSettings(
         seed=seed, center=(float(center[0]), float(center[1])), extent=extent, spacing=SPACING, rocks=rocks
     )
-    world = Floor(seabed.make(settings, DEPTH))
+    world = Floor(build_terrain(settings, DEPTH))
     sonar = ImagingSonar(ImagingSonarSettings(snr=snr, maximum_range=MAXIMUM_RANGE), generator)
     polar = PolarGrid(bearings=tuple(sonar.bearings.tolist()), ranges=tuple(sonar.ranges.tolist()))
     maker = SectorFrames(polar=polar, grid=grid)

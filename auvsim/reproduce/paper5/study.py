@@ -56,10 +56,10 @@ ROWS: dict[str, Row] = {
     ),
     "array_0": Row(title="arc, array, 0 dB", conditions=arc(replace(BASE, frames="array")), methods=TWO),
     "array_6": Row(title="arc, array, +6 dB", conditions=arc(replace(BASE, frames="array", snr=6.0)), methods=TWO),
-    "rocks_straight": Row(title="straight, ray-cast, rocks, +6 dB", conditions=ROCKS, methods=TWO),
-    "rocks_arc": Row(title="arc, ray-cast, rocks, +6 dB", conditions=arc(ROCKS), methods=TWO),
-    "rough_straight": Row(title="straight, ray-cast, no rock, +6 dB", conditions=ROUGH, methods=TWO),
-    "rough_arc": Row(title="arc, ray-cast, no rock, +6 dB", conditions=arc(ROUGH), methods=TWO),
+    "rocks_straight": Row(title="straight, rocks, +6 dB", conditions=ROCKS, methods=TWO),
+    "rocks_arc": Row(title="arc, rocks, +6 dB", conditions=arc(ROCKS), methods=TWO),
+    "rough_straight": Row(title="straight, rough, +6 dB", conditions=ROUGH, methods=TWO),
+    "rough_arc": Row(title="arc, rough, +6 dB", conditions=arc(ROUGH), methods=TWO),
 }
 
 
