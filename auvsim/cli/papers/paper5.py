@@ -22,7 +22,7 @@ LEGEND = (
     "Ratios are rms position errors relative to dead reckoning in the same runs, with half their 95 % interval. "
     "Odometry errs by a bias and white noise, both uniform: 0.2 and 0.1 m/s, 0.7 and 0.3 deg/s. The pose at the "
     "start is known; a compass bias would turn path and map together, and no sonar sees it. NEES is of the pose at "
-    "the end, 1 if consistent."
+    "the end, 1 if consistent. Rows with rocks, or rough without any, have frames of the ray-cast imaging sonar."
 )
 
 

@@ -10,6 +10,8 @@ from auvsim.reproduce.paper5.study import ROWS, Study, paired_ratio
 from auvsim.reproduce.verdict import Verdict
 
 LARGEST_RATIO = {"dp": 0.45, "window": 0.15, "particles": 0.2, "graph": 0.2}  # to dead reckoning
+RAY_CAST = ("rocks_straight", "rocks_arc", "rough_straight", "rough_arc")
+LARGEST_RAY_CAST = 0.3  # of the window to dead reckoning
 LARGEST_RMS = {"dp": 3.5, "window": 1.1}  # [m]
 WINDOW_TO_DP = 0.6
 LEAST_SPEED = {"dp": 20.0, "window": 20.0, "particles": 5.0, "graph": 5.0, "landmarks": 5.0}  # times real time
@@ -38,6 +40,10 @@ def verdicts(study: Study) -> list[Verdict]:
             relative = [r.ratio_deviation / r.ratio for r in (one, other)]
             title, deviation = f"{TITLES[method]}, straight / arc", quotient * math.hypot(*relative)
             judged.append(Verdict(row=LOCK, quantity=title, measured=quotient, low=0.5, high=2.0, deviation=deviation))
+    for name in RAY_CAST:
+        if name in study.results:
+            result, title = study.results[name]["window"], f"{TITLES['window']} / dead reckoning"
+            judged.append(_at_most(name, title, result.ratio, LARGEST_RAY_CAST, result.ratio_deviation))
     for name, (mean, deviation) in study.biases.items():
         worst = int(np.argmax(np.abs(mean)))
         title = f"{ROWS[name].title.split(',')[0]}, worst axis [m]"

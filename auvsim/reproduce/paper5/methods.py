@@ -24,6 +24,8 @@ from estimators.map_path.window import WindowFilter
 
 KEEP = 6.0  # age up to which frames are used [s]
 START = np.diag(np.square((0.01, 0.01, 1e-4)))  # the study is about drift: the start is known [m, m, rad]
+FLOOR_SPREAD = 0.2  # assumed of frames of the ray-cast sonar, less than a cell [m]
+FLOOR_SNR = 9.5  # assumed of the same: a tenth of the variance is the floor's [dB]
 GPS_DEVIATION = 2.0  # of a fix, each axis [m]
 
 
@@ -40,9 +42,13 @@ class Track:
 def frame_model(conditions: Conditions, weighting: Weighting = "field") -> FrameModel:
     """The statistics that the methods assume: the true ones; of the array's frames those of point frames of variance 1.
 
-    The array's frames have neither a Gaussian point spread nor white noise, and no method is told what they have.
+    The array's frames have neither a Gaussian point spread nor white noise, and no method is told what they have. Nor
+    are those of the ray-cast sonar: of them the point spread and its share of the variance are assumed.
     """
-    model = FrameModel(density=conditions.density, weighting=weighting).scaled(conditions.snr)
+    if conditions.frames == "floor":
+        model = FrameModel(point_spread=FLOOR_SPREAD, weighting=weighting).scaled(FLOOR_SNR)
+    else:
+        model = FrameModel(density=conditions.density, weighting=weighting).scaled(conditions.snr)
     if conditions.frames == "point":
         return model
     features = model.density * math.pi * model.point_spread**2 * model.amplitude**2

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from auvsim.base.randomness import stream
+from auvsim.reproduce.paper5.floors import floor_frames
 from estimators.core.types import Array
 from estimators.map_path.beamforming import LineArray
 from estimators.map_path.frames import SectorGrid, SonarFrame, to_sector
@@ -27,8 +28,9 @@ class Conditions:
     speed: float = 1.5  # [m/s]
     turn_rate: float = 0.0  # [rad/s]
     snr: float = 0.0  # of a feature in the middle of its cell, or beam [dB]
-    density: float = 0.1  # of features [1/m^2]
-    frames: Literal["point", "array"] = "point"  # Gaussian point spread in white noise, or the 32-element array
+    density: float = 0.1  # of features or rocks [1/m^2]
+    # Gaussian point spread in white noise, the 32-element array, or the ray-cast sonar over a rough floor with rocks
+    frames: Literal["point", "array", "floor"] = "point"
     speed_bias: float = 0.2  # of odometry [m/s]
     speed_noise: float = 0.1
     turn_rate_bias: float = math.radians(0.7)  # [rad/s]
@@ -73,11 +75,16 @@ def simulate(conditions: Conditions, seed: int, motion: tuple[Input, ...] | None
     poses = dead_reckoned(np.array([0.0, 0.0, heading]), motion)
     low, high = poses[:, :2].min(axis=0) - 25.0, poses[:, :2].max(axis=0) + 25.0
     features = place.uniform(low, high, (place.poisson(conditions.density * np.prod(high - low)), 2))
-    render = _array_frame if conditions.frames == "array" else point_frame
-    frames = tuple(
-        SonarFrame(stamp=float(k), intensity=render(features, pose, conditions.snr, noise), geometry=GRID, sequence=k)
-        for k, pose in enumerate(poses)
-    )
+    if conditions.frames == "floor":
+        frames = floor_frames(poses, GRID, rocks=conditions.density, snr=conditions.snr, seed=seed, generator=noise)
+    else:
+        render = _array_frame if conditions.frames == "array" else point_frame
+        frames = tuple(
+            SonarFrame(
+                stamp=float(k), intensity=render(features, pose, conditions.snr, noise), geometry=GRID, sequence=k
+            )
+            for k, pose in enumerate(poses)
+        )
     if conditions.bad_frames:
         frames = _spoiled(frames, conditions.bad_frames, stream(seed, 0, "paper5/bad_frames"))
     bias = odometry.uniform(-1.0, 1.0, 2) * (conditions.speed_bias, conditions.turn_rate_bias)

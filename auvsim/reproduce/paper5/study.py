@@ -35,6 +35,8 @@ class Row:
 
 
 BASE = Conditions()
+ROCKS = Conditions(frames="floor", snr=6.0)
+ROUGH = replace(ROCKS, density=0.0)
 ROWS: dict[str, Row] = {
     "straight": Row(title="straight, 0 dB", conditions=BASE, methods=ALL, quick_runs=4),
     "arc": Row(title="arc, 0 dB", conditions=arc(BASE), methods=ALL, quick_runs=4),
@@ -54,6 +56,10 @@ ROWS: dict[str, Row] = {
     ),
     "array_0": Row(title="arc, array, 0 dB", conditions=arc(replace(BASE, frames="array")), methods=TWO),
     "array_6": Row(title="arc, array, +6 dB", conditions=arc(replace(BASE, frames="array", snr=6.0)), methods=TWO),
+    "rocks_straight": Row(title="straight, rocks, +6 dB", conditions=ROCKS, methods=TWO),
+    "rocks_arc": Row(title="arc, rocks, +6 dB", conditions=arc(ROCKS), methods=TWO),
+    "rough_straight": Row(title="straight, rough, +6 dB", conditions=ROUGH, methods=TWO),
+    "rough_arc": Row(title="arc, rough, +6 dB", conditions=arc(ROUGH), methods=TWO),
 }
 
 

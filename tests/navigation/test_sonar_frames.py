@@ -1,0 +1,91 @@
+"""Standardised frames of an imaging sonar: where echoes are laid, what gain, shade and altitude do, and bad pings."""
+
+import numpy as np
+import pytest
+
+from auvsim.navigation.sonar_frames import SectorFrames
+from estimators.map_path.frames import EMPTY, NOT_FINITE, PolarGrid, SectorGrid, fault
+
+GRID = SectorGrid(cell=0.5, shape=(40, 80), ranges=(1.0, 20.0), half_sector=np.radians(60.0))
+POLAR = PolarGrid(
+    bearings=tuple(np.radians(np.linspace(-60.0, 60.0, 121)).tolist()), ranges=tuple(np.arange(1.0, 21.0, 0.1).tolist())
+)
+MAKER = SectorFrames(polar=POLAR, grid=GRID)
+
+
+def speckle(seed: int) -> np.ndarray:
+    """A ping of nothing but speckle."""
+    return np.random.default_rng(seed).standard_exponential(POLAR.shape)
+
+
+def made(intensity: np.ndarray, altitude: float = 4.0) -> np.ndarray:
+    """The image of a ping."""
+    return MAKER.frame(intensity, altitude=altitude, stamp=2.5, sequence=7).intensity
+
+
+@pytest.mark.parametrize("altitude", [0.5, 6.0])
+def test_an_echo_is_laid_on_the_floor_below_its_slant_range(altitude: float) -> None:
+    """A bright sample at 0.3 rad to starboard and 9.3 m ahead on the floor."""
+    bearing, horizontal = 0.3, 9.3
+    beam = int(np.argmin(np.abs(np.array(POLAR.bearings) - bearing)))
+    sample = int(np.argmin(np.abs(np.array(POLAR.ranges) - np.hypot(horizontal, altitude))))
+    intensity = np.ones(POLAR.shape)
+    intensity[beam, sample] = 1000.0
+    row, column = np.unravel_index(int(np.argmax(made(intensity, altitude))), GRID.shape)
+    forward, starboard = GRID.centres[row, column]
+    # Half a cell, and what half a beam and half a range bin move it.
+    assert forward == pytest.approx(horizontal * np.cos(bearing), abs=0.25 + 0.1)
+    assert starboard == pytest.approx(horizontal * np.sin(bearing), abs=0.25 + 0.1)
+
+
+def test_rings_have_mean_0_and_variance_1() -> None:
+    """Whatever the falling off with range, and the unit."""
+    fall = np.exp(-0.3 * np.array(POLAR.ranges))
+    image = made(speckle(1) * fall)
+    distance = np.hypot(*np.moveaxis(GRID.centres, 2, 0))
+    for low in range(1, 20):
+        ring = image[GRID.seen & (distance >= low) & (distance < low + 1.0)]
+        assert (ring.mean(), ring.std()) == (pytest.approx(0.0, abs=1e-9), pytest.approx(1.0, abs=1e-9))
+    assert not image[~GRID.seen].any()
+    # Means of n samples of speckle lean to the bright side by 2 / sqrt(n), their logarithms to the dark by 1 / sqrt(n).
+    assert np.mean(image[GRID.seen] ** 3) < 0.0
+    np.testing.assert_allclose(made(1e-9 * speckle(1) * fall), image, atol=1e-9)
+
+
+def test_neighbouring_samples_of_a_cell_are_averaged_before_the_logarithm() -> None:
+    """A sample that heard nothing beside loud ones leaves no hole."""
+    beams, columns = np.indices(POLAR.shape)
+    holes = np.where((beams + columns) % 2 == 0, 0.0, 2.0)
+    far = np.hypot(*np.moveaxis(GRID.centres, 2, 0)) > 8.0
+    noisy = speckle(2)
+    image, plain = made(holes * noisy), made(noisy)
+    # Half the samples are the same.
+    assert 0.5 < np.corrcoef(image[GRID.seen & far], plain[GRID.seen & far])[0, 1] < 0.95
+    assert image.min() > -6.0
+
+
+def test_broad_shade_that_goes_with_the_vehicle_is_removed() -> None:
+    """Two pings that share nothing but it agree no more than by chance: 0.03 is a deviation of 1200 cells."""
+    shade = np.exp(0.8 * np.sin(3.0 * np.array(POLAR.bearings)))[:, None]
+    one, two = (made(speckle(seed) * shade)[GRID.seen] for seed in (3, 4))
+    assert abs(np.corrcoef(one, two)[0, 1]) < 0.1
+
+
+def test_cells_out_of_the_sonars_ranges_are_0() -> None:
+    """At 15 m altitude a slant range of 20.9 m ends 14.55 m ahead; at 0.2 m the nearest of 1 m begins at 0.98 m."""
+    distance = np.hypot(*np.moveaxis(GRID.centres, 2, 0))
+    image = made(speckle(5), 15.0)
+    assert not image[distance > 14.6].any()
+    assert np.count_nonzero(image[GRID.seen & (distance < 14.5)]) == np.count_nonzero(GRID.seen & (distance < 14.5))
+
+
+def test_bad_pings_stay_bad() -> None:
+    """They are refused by name; a stamp and a number go with every frame."""
+    size = GRID.seen.size
+    assert fault(made(np.zeros(POLAR.shape)), size) == EMPTY
+    assert fault(made(np.full(POLAR.shape, np.nan)), size) == NOT_FINITE
+    one_missing = speckle(6)
+    one_missing[40, 100] = np.nan
+    assert fault(made(one_missing), size) == NOT_FINITE
+    frame = MAKER.frame(speckle(7), altitude=4.0, stamp=2.5, sequence=7)
+    assert (frame.stamp, frame.sequence, fault(frame.intensity, size)) == (2.5, 7, "")
