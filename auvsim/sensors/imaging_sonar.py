@@ -47,8 +47,8 @@ class ImagingSonarSettings(Settings):
     frequency: float = Field(default=750.0, ge=50.0, le=1000.0, description="of the sound, for its absorption [kHz]")
     snr: float = Field(
         default=15.0,
-        ge=-60.0,
-        le=100.0,
+        ge=-100.0,
+        le=300.0,
         description="echo of level sand by noise, half the maximum range away and at 5 m height [dB]",
     )
     gain: float = Field(
