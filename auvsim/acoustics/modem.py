@@ -1,14 +1,14 @@
 """Acoustic modems: what they can do, by presets of real ones, and what they send by themselves."""
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
 from auvsim.acoustics.presets import PRESETS, Preset
 from auvsim.base.settings import Settings
 
-Vector = tuple[float, float, float]
+Offset = Annotated[float, Field(ge=-20.0, le=20.0)]  # from the body's origin [m]
 
 
 class TellSettings(Settings):
@@ -38,7 +38,7 @@ class ModemSettings(Settings):
     preset: Literal["micromodem_fsk", "micromodem_psk", "s2c_r_18_34", "seatrac_x150", "atm_900"] = Field(
         default="micromodem_psk", description=", ".join(PRESETS)
     )
-    bit_rate: float | None = Field(default=None, gt=0.0, description="bit rate [bit/s]")
+    bit_rate: float | None = Field(default=None, ge=1.0, description="bit rate [bit/s]")
     preamble: float | None = Field(default=None, ge=0.0, description="duration before the first bit [s]")
     frequency: float | None = Field(default=None, ge=400.0, le=1e5, description="centre of the band [Hz]")
     bandwidth: float | None = Field(default=None, gt=0.0, description="width of the band [Hz]")
@@ -60,7 +60,9 @@ class ModemSettings(Settings):
     turn_around: float = Field(
         default=2.0, gt=0.0, description="known time from the first wave front of a request to that of the reply [s]"
     )
-    transducer: Vector = Field(default=(0.0, 0.0, 0.0), description="place in the vehicle's body frame [m]")
+    transducer: tuple[Offset, Offset, Offset] = Field(
+        default=(0.0, 0.0, 0.0), description="place in the vehicle's body frame [m]"
+    )
     tell: TellSettings = TellSettings()
     ask: AskSettings = AskSettings()
 

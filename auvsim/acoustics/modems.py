@@ -221,7 +221,10 @@ def _check_replies(equipment: Mapping[str, Equipment], polling: PollingSettings 
     else:
         for name, (settings, _) in equipment.items():
             if settings.ask.whom is not None:
-                _known(settings.ask.whom, [*equipment], f"vehicles.{name}.modem.ask.whom")
+                key = f"vehicles.{name}.modem.ask.whom"
+                _known(settings.ask.whom, [*equipment], key)
+                if settings.ask.whom == name:
+                    raise InputError(f"{key}: '{name}' cannot ask itself; name another, or none")
                 asked.append((name, settings.ask.whom, REQUEST))
     for asks, name, kind in asked:
         modem, settings = equipment[asks].modem.modem, equipment[name].modem

@@ -153,7 +153,7 @@ def _levels(low: float, high: float) -> list[float]:
     fine = [round(step * 10.0**k, 9) for k in decades for step in STEPS]
     inside = [level for level in fine if low <= level <= high]
     inside = inside[:: math.ceil(len(inside) / MOST_LEVELS) or 1]
-    return inside if len(inside) >= 2 else [float(f"{v:.4g}") for v in np.linspace(low, high, 4)]
+    return inside if len(inside) >= 2 else [float(f"{v:.6g}") for v in np.linspace(low, high, 4)]
 
 
 def _patch(e: MapEllipse, scale: float) -> EllipsePatch:

@@ -44,7 +44,7 @@ def read(path: Path, model: type[Model], what: str) -> Model:
     """
     document = yaml_text.load(path)
     if not isinstance(document.value, Mapping):
-        raise InputError(f"{path}: {what} is a mapping of keys to values; `auvsim identify` writes one")
+        raise InputError(f"{path}: {what} is a mapping of keys to values, not {type(document.value).__name__}")
     try:
         return model.model_validate_json(json.dumps(document.value, default=str), strict=True)
     except ValidationError as error:

@@ -53,7 +53,7 @@ class Run:
     """
 
     scenario: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")]
-    """The scenario, or the name of a shipped one (three_vehicles)."""
+    """The scenario, or the name of a shipped one, such as three_vehicles, leader_follower, formation, rov_docking."""
     seed: int = 0
     """Seed of every random number."""
     trial: int = 0

@@ -1,5 +1,6 @@
 """`auvsim bound`: how well each follower of a scenario can know its place, over where another starts; maps of it."""
 
+import math
 import sys
 from pathlib import Path
 
@@ -17,6 +18,7 @@ from auvsim.simulation.scenario import Scenario
 
 WIDTH = 110  # of the table [columns]
 MOST = 301  # stations along an axis
+SPANS = (1.0, 1e5)  # width of the square of stations [m]
 
 
 def run(
@@ -30,12 +32,12 @@ def run(
     """
     if not 2 <= side <= MOST:
         raise InputError(f"command line: --side {side} must lie in 2 .. {MOST} stations")
-    if span is not None and not span > 0.0:
-        raise InputError(f"command line: --span {span:g} must be above 0 m")
+    if span is not None and not SPANS[0] <= span <= SPANS[1]:
+        raise InputError(f"command line: --span {span:g} must lie in {SPANS[0]:g} .. {SPANS[1]:g} m")
     if after is not None and not 0.0 <= after < scenario.duration:
         raise InputError(f"command line: --after {after:g} must lie in the run's 0 .. {scenario.duration:g} s")
-    if not blind > 0.0:
-        raise InputError(f"command line: --blind {blind:g} must be above 0 m")
+    if not 0.0 < blind < math.inf:
+        raise InputError(f"command line: --blind {blind:g} must be a finite number above 0 m")
     with output_folder(out):
         with StudyProgress() as progress:
             found = mission_bounds(

@@ -18,6 +18,10 @@ from auvsim.reproduce.products import write_files
 
 MOST = 50  # leaders
 WIDTH = 110  # of the table [columns]
+BOUNDS = {  # of the options, both included; units as in the help
+    "--noise": (1e-4, 1e6), "--step": (1e-3, 1e6), "--reach": (1e-3, 1e7), "--speed": (0.0, 100.0),
+    "--apart": (0.0, 1e7),
+}  # fmt: skip
 
 
 def run(formation: Formation, out: Path) -> int:
@@ -65,17 +69,21 @@ def formation(
     deviations = [_number(text, "--noise") for text in noise.split(",")]
     if len(deviations) not in (1, len(places)):
         raise InputError(f"command line: --noise has {len(deviations)} values, not 1 or {len(places)}, one each")
-    limits = {"--noise": min(deviations), "--step": step, "--reach": reach, "--modem": modem}
-    for name, value in limits.items():
-        if not (value > 0.0 and (math.isfinite(value) or name == "--modem")):
-            raise InputError(f"command line: {name} {value:g} must be a finite number above 0")
-    for name, value in {"--speed": speed, "--apart": apart}.items():
-        if not (value >= 0.0 and math.isfinite(value)):
-            raise InputError(f"command line: {name} {value:g} must be a finite number that is not negative")
+    given = [*(("--noise", one) for one in deviations), ("--step", step), ("--reach", reach), ("--speed", speed)]
+    for name, value in (*given, ("--apart", apart)):
+        low, high = BOUNDS[name]
+        if not low <= value <= high:
+            raise InputError(f"command line: {name} {value:g} must lie in {low:g} .. {high:g}")
+    if not modem > 0.0:
+        raise InputError(f"command line: --modem {modem:g} must be above 0 m")
     if not math.isfinite(heading_deg):
         raise InputError(f"command line: --heading-deg {heading_deg:g} must be a finite number")
     if apart >= modem:
         raise InputError(f"command line: --apart {apart:g} must be less than --modem {modem:g}")
+    far = next((p for p in places if np.linalg.norm(p - own) > modem), None)
+    if far is not None:
+        raise InputError(f"command line: --leaders: the one at {_text(far)} is further from the follower than --modem "
+                         f"{modem:g} m; no range comes from there")  # fmt: skip
     limits_of_moves = formation_map.Reach(distance=reach, modem=modem, apart=apart)
     return Formation(
         leaders=np.array(places), follower=own, deviations=np.resize(np.array(deviations), len(places)),
@@ -139,7 +147,10 @@ def _place(text: str, option: str) -> Array:
     if len(parts) not in (2, 3):
         raise InputError(f"command line: {option} '{_short(text)}': give north,east or north,east,depth in metres")
     values = [_number(part, option) for part in parts]
-    return np.array([*values, 0.0][:3])
+    place = np.array([*values, 0.0][:3])
+    if place[2] < 0.0:
+        raise InputError(f"command line: {option} '{_short(text)}': a depth of {place[2]:g} m is out of the water")
+    return place
 
 
 def _number(text: str, option: str) -> float:

@@ -54,6 +54,10 @@ def from_sheet(path: Path, out: Path) -> int:
     from auvsim.vehicles import sheet
 
     made = sheet.read(path)
+    try:
+        made_of.numbers(made)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
     model = out / f"{made.name}.xml"
     if model.exists():
         raise InputError(f"{model} exists; give another folder with --out, or remove it")

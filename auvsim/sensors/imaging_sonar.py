@@ -46,7 +46,10 @@ class ImagingSonarSettings(Settings):
     bins: int = Field(default=200, ge=8, le=2048, description="ranges of a beam [-]")
     frequency: float = Field(default=750.0, ge=50.0, le=1000.0, description="of the sound, for its absorption [kHz]")
     snr: float = Field(
-        default=15.0, description="echo of level sand by noise, half the maximum range away and at 5 m height [dB]"
+        default=15.0,
+        ge=-100.0,
+        le=300.0,
+        description="echo of level sand by noise, half the maximum range away and at 5 m height [dB]",
     )
     gain: float = Field(
         default=30.0, ge=0.0, le=40.0, description="of the receiver, times the logarithm of range, with absorption [dB]"
@@ -56,7 +59,9 @@ class ImagingSonarSettings(Settings):
     )
     speckle: bool = Field(default=True, description="whether each sample has the exponential law of many scatterers")
     log_frames: bool = Field(default=False, description="whether the log holds all frames, some 20 kB each")
-    nose: float = Field(default=0.0, description="place of its transducer ahead of the body's origin [m]")
+    nose: float = Field(
+        default=0.0, ge=-20.0, le=20.0, description="place of its transducer ahead of the body's origin [m]"
+    )
 
     @model_validator(mode="after")
     def _ranges_rise(self) -> "ImagingSonarSettings":

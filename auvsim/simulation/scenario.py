@@ -17,6 +17,7 @@ from auvsim.base.settings import Settings
 from auvsim.control.registry import ControlSettings
 from auvsim.control.torpedo import AutopilotSettings
 from auvsim.missions.docking.guidance import DockingSettings
+from auvsim.missions.formation.settings import FormationSettings
 from auvsim.missions.registry import MissionSettings
 from auvsim.missions.track.mission import TrackSettings
 from auvsim.missions.track.patterns import Circle, Weave, points
@@ -29,6 +30,7 @@ from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
 from auvsim.water.terrain import FlatSettings, TerrainSettings
 
+NEAREST_STATIONS = 1.0  # between two stations of a formation [m]
 Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
 
 
@@ -173,6 +175,34 @@ class Scenario(Settings):
         return self
 
     @model_validator(mode="after")
+    def _formations_fit(self) -> "Scenario":
+        stations: dict[str, FormationSettings] = {}
+        for name, vehicle in self.vehicles.items():
+            s = vehicle.mission
+            if not isinstance(s, FormationSettings):
+                continue
+            self._leaders_fit(name, s.leaders)
+            for other, o in stations.items():
+                same = (s.north, s.east, s.course_deg, s.speed) == (o.north, o.east, o.course_deg, o.speed)
+                apart = math.dist((s.ahead, s.starboard, s.depth), (o.ahead, o.starboard, o.depth))
+                if same and apart < NEAREST_STATIONS:
+                    raise ValueError(f"vehicles.{name}.mission: its station is {apart:g} m from that of '{other}'; "
+                                     f"give it one {NEAREST_STATIONS:g} m away or more")  # fmt: skip
+            stations[name] = s
+        return self
+
+    def _leaders_fit(self, name: str, leaders: tuple[str, ...]) -> None:
+        key, others = f"vehicles.{name}.mission.leaders", [other for other in self.vehicles if other != name]
+        for leader in leaders:
+            if leader not in others:
+                raise ValueError(f"{key}: no other vehicle '{leader}'; there are {', '.join(others) or 'none'}")
+        if len({*leaders}) < len(leaders):
+            raise ValueError(f"{key}: {', '.join(leaders)} must name each once")
+        for one in (name, *leaders) if leaders else ():
+            if self.vehicles[one].modem is None:
+                raise ValueError(f"{key}: '{one}' has no modem; give vehicles.{one}.modem, or no leaders")
+
+    @model_validator(mode="after")
     def _all_in_the_water(self) -> "Scenario":
         if self.water.terrain.kind != "grid":  # whose file is read when the run begins
             try:
@@ -260,6 +290,8 @@ def _places(scenario: Scenario) -> Iterator[tuple[str, float, float, float]]:
         yield f"structures.{name}.depth", structure.north, structure.east, structure.depth
     for name, vehicle in scenario.vehicles.items():
         yield f"vehicles.{name}.start.depth", *scenario.start_position(name)
+        if isinstance(vehicle.mission, FormationSettings):
+            yield f"vehicles.{name}.mission.depth", *scenario.start_position(name)[:2], vehicle.mission.depth
         if isinstance(vehicle.mission, TrackSettings):
             pattern = vehicle.mission.pattern
             north, east, _ = scenario.start_position(name)

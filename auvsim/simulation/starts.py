@@ -8,7 +8,9 @@ import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
+from auvsim.missions.formation.settings import FormationSettings
 from auvsim.missions.mission import Place
+from auvsim.missions.track.mission import TrackSettings
 from auvsim.simulation.scenario import Scenario, check_depths
 
 ALONG = np.linspace(0.0, 1.0, 41)  # places along a dock's axis, from its mouth to its end, as shares of its length
@@ -29,7 +31,10 @@ def check(scenario: Scenario, world: Any, agents: Sequence[Any], places: Mapping
     if scenario.water.terrain.kind == "grid":  # the others were seen to by the scenario itself
         check_depths(scenario)
     for agent in agents:
-        _check_speed(agent, scenario.vehicles[agent.name].start.speed)
+        settings = scenario.vehicles[agent.name]
+        _check_speed(agent, "start", settings.start.speed)
+        if isinstance(settings.mission, TrackSettings | FormationSettings):
+            _check_speed(agent, "mission", settings.mission.speed)
     for one, other in combinations(places.values(), 2):
         if _docks_overlap(one, other):
             raise InputError(f"structures.{other.name}: it overlaps with '{one.name}'; place them apart")
@@ -42,8 +47,8 @@ def check(scenario: Scenario, world: Any, agents: Sequence[Any], places: Mapping
                 raise InputError(f"vehicles.{agent.name}.start: it is inside '{place.name}'; start it outside")
 
 
-def _check_speed(agent: Any, speed: float) -> None:
-    """Sees that a vehicle can hold the speed [m/s] at which it starts."""
+def _check_speed(agent: Any, key: str, speed: float) -> None:
+    """Sees that a vehicle can hold the speed [m/s] of its start or its mission."""
     if not hasattr(agent, "holds") or agent.holds(speed):
         return
     slow, fast = 0.0, speed
@@ -51,7 +56,7 @@ def _check_speed(agent: Any, speed: float) -> None:
         middle = 0.5 * (slow + fast)
         slow, fast = (middle, fast) if agent.holds(middle) else (slow, middle)
     raise InputError(
-        f"vehicles.{agent.name}.start.speed: {speed:g} m/s is more than '{agent.vehicle.model}' can hold, "
+        f"vehicles.{agent.name}.{key}.speed: {speed:g} m/s is more than '{agent.vehicle.model}' can hold, "
         f"{slow:.2f} m/s"
     )
 

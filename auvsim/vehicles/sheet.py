@@ -12,6 +12,9 @@ from auvsim.base.settings import Settings
 DENSITY = 1026.0  # of the water in which the vehicle is trimmed [kg/m3]
 GRAVITY = 9.81  # [m/s2]
 FULL = (0.55, 1.0)  # shares of the enclosing cylinder that hulls fill
+WIDEST_SCREW = 2.0  # diameter of a propeller by the hull's
+WIDEST_FIN = 2.0  # span of a fin by the hull's diameter
+ASPECT = (0.1, 10.0)  # span of a fin by its chord
 
 
 class FinsSheet(Settings):
@@ -31,7 +34,7 @@ class Sheet(Settings):
     length: float = Field(gt=0.0, le=20.0, description="of the hull [m]")
     diameter: float = Field(gt=0.0, le=5.0, description="of the hull [m]")
     mass: float = Field(gt=0.0, description="in air [kg]")
-    top_speed: float = Field(gt=0.0, le=20.0, description="through the water [m/s]")
+    top_speed: float = Field(ge=0.1, le=20.0, description="through the water [m/s]")
     shaft_rpm: float = Field(gt=0.0, le=20_000.0, description="at that speed [rpm]")
     fins: FinsSheet
     buoyancy: float = Field(default=0.0, description="net, positive floats, in sea water [N]")
@@ -54,11 +57,31 @@ class Sheet(Settings):
             )
         if not abs(self.buoyancy) <= 0.05 * self.mass * GRAVITY:
             raise ValueError(f"buoyancy: {self.buoyancy:g} N is more than 5 % of the weight; give ballast, not this")
-        if not self.fins.place <= 0.5 * self.length:
-            raise ValueError(f"fins.place: {self.fins.place:g} m is behind the hull's end at {0.5 * self.length:g} m")
+        self._tail_fits()
+        if self.propeller_diameter is not None and self.propeller_diameter > WIDEST_SCREW * self.diameter:
+            raise ValueError(
+                f"propeller_diameter: {self.propeller_diameter:g} m is more than {WIDEST_SCREW:g} times the hull's "
+                f"diameter, {self.diameter:g} m"
+            )
         if not self.centre_of_gravity <= 0.5 * self.diameter:
             raise ValueError(f"centre_of_gravity: {self.centre_of_gravity:g} m is outside the hull")
         return self
+
+    def _tail_fits(self) -> None:
+        fins, end = self.fins, 0.5 * self.length
+        if not fins.place <= end:
+            raise ValueError(f"fins.place: {fins.place:g} m is behind the hull's end at {end:g} m")
+        if not fins.place >= 0.5 * end:
+            raise ValueError(f"fins.place: {fins.place:g} m is no place of tail fins; give {0.5 * end:g} to {end:g} m")
+        if not fins.span <= WIDEST_FIN * self.diameter:
+            raise ValueError(
+                f"fins.span: {fins.span:g} m is more than {WIDEST_FIN:g} times the hull's diameter, {self.diameter:g} m"
+            )
+        if not ASPECT[0] <= fins.span / fins.chord <= ASPECT[1]:
+            raise ValueError(
+                f"fins.chord: the span is {fins.span / fins.chord:.3g} times the chord of {fins.chord:g} m; estimates "
+                f"hold for {ASPECT[0]:g} to {ASPECT[1]:g}"
+            )
 
 
 def read(path: Path) -> Sheet:

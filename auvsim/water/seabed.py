@@ -19,6 +19,7 @@ from auvsim.base.settings import Settings
 from auvsim.water.terrain_grid import Corner, GriddedFloor
 
 MOST_CELLS = 4097 * 4097
+MOST_ROCKS = 200_000
 ROCK_ECHO = 10.0  # backscatter of rock by that of sand: some 10 dB at grazing angles of 10 to 60 deg (ibid., fig. G.1)
 PIPE_ECHO = 15.0  # of a steel or concrete pipe; assumed
 
@@ -60,7 +61,28 @@ class SeabedSettings(Settings):
                 f"extent {self.extent:g} m at spacing {self.spacing:g} m has {cells:.2g} points, at most "
                 f"{MOST_CELLS:.2g}: give a spacing of {self.extent / (math.sqrt(MOST_CELLS) - 1.0):.2g} m or more"
             )
+        if (rocks := self.rocks * self.extent**2) > MOST_ROCKS:
+            raise ValueError(
+                f"rocks: {self.rocks:g} 1/m2 on {self.extent:g} m squared are {rocks:.2g}, at most {MOST_ROCKS}: give "
+                f"{MOST_ROCKS / self.extent**2:.2g} or less"
+            )
+        waves = {"longest": self.roughness and self.longest, "ripple_length": self.ripple_height and self.ripple_length}
+        for key, length in waves.items():
+            if 0.0 < length < 2.0 * self.spacing:
+                raise ValueError(
+                    f"{key}: {length:g} m is too short for points {self.spacing:g} m apart; give "
+                    f"{2.0 * self.spacing:g} m or more, or less spacing"
+                )
+        if self.pipeline is not None and not self._is_crossed_by(self.pipeline):
+            raise ValueError(f"pipeline: it passes the generated floor of {self.extent:g} m; move it, or the center")
         return self
+
+    def _is_crossed_by(self, pipe: PipelineSettings) -> bool:
+        """Whether a pipeline lies on the floor: corners are on both sides of it."""
+        heading, half = math.radians(pipe.heading_deg), 0.5 * self.extent
+        north, east = self.center[0] - pipe.north, self.center[1] - pipe.east
+        across = math.cos(heading) * east - math.sin(heading) * north
+        return abs(across) < half * (abs(math.cos(heading)) + abs(math.sin(heading)))
 
 
 @lru_cache(maxsize=4)

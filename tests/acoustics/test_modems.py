@@ -1,5 +1,6 @@
 """Modems in a run: medium access, stamps by clocks, ranges one way and two ways, bearings, polls, pulses."""
 
+import json
 import math
 
 import numpy as np
@@ -191,6 +192,19 @@ def test_a_turn_around_that_is_too_short_is_refused():
 def test_who_is_asked_must_have_a_modem():
     with pytest.raises(InputError, match=r"vehicles\.a\.modem.ask.whom: no modem on 'z'; there are a"):
         Fleet({"a": ((0, 0, 20), STILL, {"ask": {"whom": "z"}})})
+
+
+def test_nobody_asks_itself():
+    with pytest.raises(InputError, match=r"vehicles\.a\.modem\.ask\.whom: 'a' cannot ask itself"):
+        Fleet({"a": ((0, 0, 20), STILL, {"ask": {"whom": "a"}}), "b": ((9, 0, 20), STILL, {})})
+
+
+@pytest.mark.parametrize("key", ["bit_rate: 0.5", "bit_rate: -80.0", "transducer: [21.0, 0.0, 0.0]"])
+def test_a_modem_that_cannot_be_is_refused(key):
+    """Packets would last for ever, or begin far from the vehicle."""
+    name, value = key.split(": ")
+    with pytest.raises(ValueError, match=name):
+        ModemSettings.model_validate({name: json.loads(value)})
 
 
 def test_a_master_polls_in_turn_and_nobody_else_sends():

@@ -192,7 +192,9 @@ def test_command_prints_a_line_for_each_follower(tmp_path, capsys):
     [
         (["leader_follower", "--side", "1"], "--side 1 must lie in 2 .. 301"),
         (["leader_follower", "--move", "moon"], "--move moon: nobody ranges to it; they do to leader"),
-        (["leader_follower", "--span", "-5"], "--span -5 must be above 0 m"),
+        (["leader_follower", "--span", "-5"], "--span -5 must lie in 1 .. 100000 m"),
+        (["leader_follower", "--span", "inf"], "--span inf must lie in"),
+        (["leader_follower", "--blind", "inf"], "--blind inf must be a finite number"),
         (["leader_follower", "--after", "1e6"], "--after 1e+06 must lie in"),
         (["dock_by_ranges"], "no vehicle on a track ranges to anything"),
         (["leader_follower", "--vehicles.follower.sensors.dvl.enabled", "false"], "a bound needs a DVL"),

@@ -69,6 +69,11 @@ def test_it_writes_a_table_and_a_map(capsys, tmp_path):
         (["--leaders", "0,100;5,5", "--speed", "nan"], "--speed"),
         (["--leaders", "0,100;5,5", "--step=-1"], "--step"),
         (["--leaders", "0,100;5,5", "--apart", "4000"], "--apart"),
+        (["--leaders", "0,100,-5;5,60"], "a depth of -5 m is out of the water"),
+        (["--leaders", "0,100;5,5", "--noise", "1e-300"], "--noise 1e-300 must lie in"),
+        (["--leaders", "0,100;5,5", "--noise", "1,1e9"], "1e+09"),
+        (["--leaders", "0,100;5,5", "--step", "1e12"], "--step 1e+12 must lie in"),
+        (["--leaders", "0,100;5,5", "--modem", "90"], "the one at 0, 100 is further from the follower than --modem 90"),
         ([], "leaders"),
     ],
 )

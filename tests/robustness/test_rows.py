@@ -363,3 +363,35 @@ def test_a_distribution_at_the_top_is_no_scenario(grid: dict, base: dict) -> Non
     """It would replace every key."""
     with pytest.raises(InputError, match=r"(uniform|choice|normal): unknown key"):
         plan.parse({"trials": 2, "base": base, "grid": grid})
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (
+            "mission.leaders [leader_1,nobody]",
+            "mission.leaders: no other vehicle 'nobody'; there are leader_1, leader_2,",
+        ),
+        ("mission.leaders [follower]", "mission.leaders: no other vehicle 'follower'"),
+        ("mission.leaders [leader_1,leader_1]", "mission.leaders: leader_1, leader_1 must name each once"),
+        ("modem null", "mission.leaders: 'follower' has no modem; give vehicles.follower.modem, or no leaders"),
+        ("mission.depth 400", "mission.depth: 400 m is not between the surface and the sea floor at 200 m"),
+        (
+            "mission {kind: formation, ahead: 150.0, depth: 12.5}",
+            "mission: its station is 0.5 m from that of 'leader_1'",
+        ),
+        ("mission.speed 50", "mission.speed: 50 m/s is more than 'remus100' can hold"),
+    ],
+)
+def test_a_formation_that_cannot_be(capsys, arguments: str, says: str) -> None:
+    """Leaders that are not there, stations at one place or in the ground, a speed that no shaft holds."""
+    key, value = arguments.split(maxsplit=1)
+    line = refused(capsys, "run", "formation", f"--vehicles.follower.{key}", value, "--duration", "4", "--out", "new")
+    assert f"vehicles.follower.{says}" in line
+    assert not Path("new").exists()
+
+
+def test_a_track_faster_than_the_shaft(capsys) -> None:
+    """It would be run at the most there is, and none would know."""
+    line = refused(capsys, "run", "leader_follower", "--vehicles.leader.mission.speed", "50", "--duration", "4")
+    assert line.startswith("command line: vehicles.leader.mission.speed: 50 m/s is more than 'remus100' can hold")

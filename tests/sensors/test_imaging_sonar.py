@@ -170,6 +170,14 @@ def test_snr_is_that_of_the_settings() -> None:
     assert 10.0 * math.log10(mean[k - 3 : k + 4].mean() / one.noise) == pytest.approx(12.0, abs=0.2)
 
 
+@pytest.mark.parametrize("key", ["snr", "nose"])
+@pytest.mark.parametrize("value", [-1e5, 1e5])
+def test_what_no_instrument_has_is_refused(key: str, value: float) -> None:
+    """An echo beyond what numbers hold, a transducer far from the vehicle."""
+    with pytest.raises(ValueError, match=key):
+        ImagingSonarSettings(**{key: value})
+
+
 def test_absorption_at_100_kilohertz() -> None:
     """Sea water of 10 degrees takes some 35 dB of a kilometre (Francois and Garrison 1982, fig. 5: 34)."""
     assert 10.0 / math.log(10.0) * 1000.0 * absorption(100.0) == pytest.approx(34.0, abs=2.0)

@@ -128,6 +128,11 @@ def test_its_autopilot_settles(tmp_path):
         ({"shaft_rpm": 60.0}, "shaft_rpm: no propeller up to twice the hull's diameter drives 2.3 m/s at 60 rpm"),
         ({"propeller_diameter": 0.03}, "propeller_diameter: a screw of 0.03 m at 1525 rpm does not drive 2.3 m/s"),
         ({"drag": 0.3}, "drag: 0.3 N at 2.3 m/s is less than that of the fins alone"),
+        ({"fins": REMUS["fins"] | {"place": 0.3}}, "fins.place: 0.3 m is no place of tail fins"),
+        ({"fins": REMUS["fins"] | {"span": 0.4}}, "fins.span: 0.4 m is more than 2 times the hull's diameter"),
+        ({"fins": REMUS["fins"] | {"chord": 1e-3}}, "fins.chord: the span is 86 times the chord of 0.001 m"),
+        ({"propeller_diameter": 0.5}, "propeller_diameter: 0.5 m is more than 2 times the hull's diameter"),
+        ({"top_speed": 1e-6}, "should be greater than or equal to 0.1 (through the water"),
         ({"displacement": 4.0}, "displacement"),
         ({"mass": None}, "mass"),
     ],
@@ -136,5 +141,12 @@ def test_a_bad_sheet_is_one_line(tmp_path, capsys, changes, said):
     assert main(["vehicle", "--from", str(written(tmp_path, **changes)), "--out", str(tmp_path / "new")]) == 2
     text = capsys.readouterr().err
     assert text.count("\n") == 1
+    assert text.startswith(f"auvsim: {tmp_path / 'sheet.yaml'}:")
     assert said in text
     assert not (tmp_path / "new").exists()
+
+
+def test_an_empty_sheet_is_named_as_such(tmp_path, capsys):
+    (tmp_path / "sheet.yaml").write_text("")
+    assert main(["vehicle", "--from", str(tmp_path / "sheet.yaml"), "--out", str(tmp_path / "new")]) == 2
+    assert "a data sheet is a mapping of keys to values" in capsys.readouterr().err

@@ -67,3 +67,26 @@ def test_what_cannot_be_is_refused() -> None:
         seabed.make(SeabedSettings(extent=40.0, roughness=8.0), 5.0)
     with pytest.raises(ValueError, match=r"give a spacing of 1\.2 m or more"):
         SeabedSettings(extent=5000.0, spacing=0.1)
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"rocks": 1.0, "extent": 1000.0, "spacing": 0.5}, r"rocks: .* at most 200000: give 0\.2 or less"),
+        ({"longest": 0.4, "spacing": 0.25}, r"longest: 0\.4 m is too short .* give 0\.5 m or more"),
+        ({"ripple_height": 0.1, "ripple_length": 0.4}, r"ripple_length: 0\.4 m is too short"),
+        ({"pipeline": PipelineSettings(north=129.0)}, "pipeline: it passes the generated floor of 256 m"),
+        ({"pipeline": PipelineSettings(north=182.0, heading_deg=135.0)}, None),
+        ({"pipeline": PipelineSettings(north=260.0, heading_deg=135.0)}, "pipeline"),
+        ({"pipeline": PipelineSettings(north=129.0), "center": (2.0, 0.0)}, None),
+        ({"ripple_length": 0.4}, None),
+        ({"roughness": 0.0, "longest": 0.4}, None),
+    ],
+)
+def test_what_no_grid_can_show_is_refused(settings: dict, says: str | None) -> None:
+    """Waves shorter than two points, a pipeline beside the floor, too many rocks; what is absent may be short."""
+    if says is None:
+        SeabedSettings(**settings)
+        return
+    with pytest.raises(ValueError, match=says):
+        SeabedSettings(**settings)
