@@ -90,7 +90,10 @@ def optimise(
             information[at, at] += inverse
             gradient[at] += inverse @ (poses[index, :2] - place)
         information = sparse.csc_matrix(information)
-        step = -splu(information).solve(gradient).reshape(-1, 3)
+        try:
+            step = -splu(information).solve(gradient).reshape(-1, 3)
+        except RuntimeError:  # singular, after poses have run away
+            break
         poses = poses + step
         poses[:, 2] = wrapped(poses[:, 2])
         if not np.isfinite(poses).all():

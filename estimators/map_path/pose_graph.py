@@ -13,6 +13,8 @@ from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Match, Search, match
 from estimators.map_path.poses import between, compose
 
+FARTHEST = 10.0  # that a match may lie from the predicted pose, in limits of the search; its peak is no match then
+
 
 @dataclass(frozen=True, kw_only=True, slots=True)
 class GraphSettings:
@@ -95,7 +97,7 @@ def _neighbours(
             continue
         relative = between(path[k - lag], path[k])
         found = match(matcher, later, [earlier], relative[None], prior, settings.search)
-        if isinstance(found, Match):
+        if isinstance(found, Match) and (np.abs(found.offset) <= FARTHEST * np.array(settings.search.limits)).all():
             edges.append(edge(k - lag, k, relative, found, settings.covariance_factor))
     return edges
 

@@ -8,12 +8,13 @@ from scipy.optimize import least_squares
 
 from auvsim.reproduce.paper5.methods import START, follow, frame_model
 from auvsim.reproduce.paper5.scenes import GRID, Conditions, simulate
-from estimators.core.errors import ParameterError
+from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.types import Gaussian
 from estimators.map_path import pose_graph
 from estimators.map_path.closures import consistent, largest_clique
 from estimators.map_path.graph import Edge, optimise
 from estimators.map_path.likelihood import Matcher
+from estimators.map_path.matching import Match
 from estimators.map_path.poses import Input, between, compose, wrapped
 from estimators.map_path.window import WindowFilter
 
@@ -92,6 +93,29 @@ def test_bad_edges_are_refused():
         optimise(truth, [Edge(0, 99, np.zeros(3), np.eye(3))], PRIOR)
     with pytest.raises(ParameterError, match="itself"):
         optimise(truth, [Edge(2, 2, np.zeros(3), np.eye(3))], PRIOR)
+
+
+def test_a_pose_that_no_edge_holds_is_an_error_of_the_estimators():
+    """The information is singular: said as such, not by the linear algebra."""
+    guess = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    with pytest.raises(NotFiniteError, match="3 poses has not converged"):
+        optimise(guess, [Edge(0, 1, np.array([1.0, 0.0, 0.0]), np.eye(3))], PRIOR)
+
+
+def test_a_match_far_from_the_prediction_makes_no_edge(monkeypatch):
+    """554 m where the search reaches less than a metre: the runs of a study that had one ran away."""
+    settings = pose_graph.GraphSettings(lags=(1,))
+    reach = np.array(settings.search.limits)
+    path = np.array([[1.5 * k, 0.0, 0.0] for k in range(3)])
+    found = [np.array([0.2, -0.1, 0.5]) * reach, np.array([0.0, 11.0, 0.0]) * reach]
+    matches = iter(found)
+
+    def fake(*_):
+        return Match(offset=next(matches), **dict.fromkeys(set(Match._fields) - {"offset"}, np.eye(3)))
+
+    monkeypatch.setattr(pose_graph, "match", fake)
+    monkeypatch.setattr(pose_graph, "edge", lambda first, second, *_: (first, second))
+    assert pose_graph._neighbours(None, ["frame"] * 3, path, 1, settings) == [(0, 1)]
 
 
 def test_the_clique_is_the_largest():
