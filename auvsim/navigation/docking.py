@@ -146,16 +146,16 @@ class DockingNavigator:
 
     @property
     def nodes(self) -> Sequence[Node[Any]]:
-        """See `Buffered`."""
+        """Nodes of the delay buffer, in order of time."""
         return self._estimator.nodes
 
     @property
     def filter(self) -> StateFilter:
-        """See `Buffered`."""
+        """The filter whose states the nodes hold."""
         return self._estimator.filter
 
     def smoothed(self) -> list[tuple[float, Gaussian]]:
-        """See `Buffered`."""
+        """Beliefs of the last seconds given all that was heard since, with their times [s]."""
         pairs = [(time, self._with_depth(b.mean, b.covariance)) for time, b in self._estimator.smoothed()]
         return [(time, Gaussian(mean=mean, covariance=covariance)) for time, (mean, covariance) in pairs]
 

@@ -82,20 +82,20 @@ class RangeNavigator:
 
     @property
     def nodes(self) -> Sequence[Node[Any]]:
-        """See `Buffered`."""
+        """Nodes of the delay buffer, in order of time."""
         return self._estimator.nodes
 
     @property
     def filter(self) -> ModelFilter:
-        """See `Buffered`."""
+        """The filter whose states the nodes hold."""
         return self._estimator.filter  # pyright: ignore[reportReturnType]
 
     def smoothed(self) -> list[tuple[float, Gaussian]]:
-        """See `Buffered`."""
+        """Beliefs of the last seconds given all that was heard since, with their times [s]."""
         return self._estimator.smoothed()
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
-        """See `Navigator.update`."""
+        """The estimate now, from the readings, messages and commands since the last update."""
         found: list[Measurement] = []
         for reading, count in averaged(readings):
             if reading.sensor == "compass":

@@ -69,7 +69,7 @@ class MotionRadiusNavigator:
         self._place: tuple[float, float] = planned_start(self._setup)
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
-        """See `Navigator.update`."""
+        """The estimate now, from the readings, messages and commands since the last update."""
         odometry, history = self._odometry, self._history
         odometry.update(time, readings)
         state = None

@@ -73,7 +73,7 @@ class PathPredictionNavigator:
         self._drift, self._time = 0.0, 0.0  # course less heading [rad], time of the last update [s]
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
-        """See `Navigator.update`."""
+        """The estimate now, from the readings, messages and commands since the last update."""
         odometry = self._odometry
         odometry.update(time, readings)
         drift = math.atan2(odometry.starboard, odometry.forward)
