@@ -16,6 +16,7 @@ from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.heard import Listener, Sight
 from auvsim.navigation.measurements import averaged, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.over_history import OverHistory
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
 from estimators.core.estimator import Estimator
@@ -31,7 +32,7 @@ from estimators.docking.models import COMPASS
 SPEED, TURNING, GYRO_BIAS = 2.0, 0.1, 1e-3  # not known at first: velocities [m/s], yaw rate, bias of a gyro [rad/s]
 
 
-class RangeNavigator:
+class RangeNavigator(OverHistory):
     """Position, heading, velocity through the water and current, by ranges to those whose packets say where they are.
 
     A range is that from where the other was when it sent to where this vehicle was when the packet arrived, and goes
@@ -79,20 +80,6 @@ class RangeNavigator:
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
         self._belief: Gaussian | None = None
-
-    @property
-    def nodes(self) -> Sequence[Node[Any]]:
-        """Nodes of the delay buffer, in order of time."""
-        return self._estimator.nodes
-
-    @property
-    def filter(self) -> ModelFilter:
-        """The filter whose states the nodes hold."""
-        return self._estimator.filter  # pyright: ignore[reportReturnType]
-
-    def smoothed(self) -> list[tuple[float, Gaussian]]:
-        """Beliefs of the last seconds given all that was heard since, with their times [s]."""
-        return self._estimator.smoothed()
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now, from the readings, messages and commands since the last update."""

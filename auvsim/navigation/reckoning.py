@@ -13,6 +13,7 @@ from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.measurements import FIX, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.over_history import OverHistory
 from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.estimator import Estimator
@@ -31,7 +32,7 @@ SPEED, TURNING = 1.0, 0.1  # what is not known at first: velocities [m/s], yaw r
 GYRO_BIAS, UNKNOWN = 1e-3, 50.0  # deviations at the start: of a gyro's bias [rad/s], of a position by ranges alone [m]
 
 
-class ReckoningNavigator:
+class ReckoningNavigator(OverHistory):
     """A filter of position, heading, velocity over ground and yaw rate, all of which only measurements tell.
 
     Velocities are random walks, so that a DVL that is away for a while costs no more than it must. Without anything
@@ -77,20 +78,6 @@ class ReckoningNavigator:
         self._estimator.reset()
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
-
-    @property
-    def nodes(self) -> Sequence[Node[Any]]:
-        """Nodes of the delay buffer, in order of time."""
-        return self._estimator.nodes
-
-    @property
-    def filter(self) -> ModelFilter:
-        """The filter whose states the nodes hold."""
-        return self._estimator.filter  # pyright: ignore[reportReturnType]
-
-    def smoothed(self) -> list[tuple[float, Gaussian]]:
-        """Beliefs of the last seconds given all that was heard since, with their times [s]."""
-        return self._estimator.smoothed()
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now, from the readings, messages and commands since the last update."""
