@@ -11,7 +11,7 @@ from auvsim.base.frames import Array, wrap
 from auvsim.data.log import StructureLog, VehicleLog
 from auvsim.data.phases import interpolate, phase_at
 from auvsim.missions.docking.dock_frame import to_body
-from auvsim.navigation.estimate import PLANAR_STATES
+from auvsim.navigation.estimate import DOCK_HEADING_BIAS, PLANAR_STATES
 from estimators.core.consistency import chi_square, interval, normalised_square
 from estimators.docking.usbl import UsblFix, UsblModel
 
@@ -33,6 +33,8 @@ class EstimateErrors:
     current: Array  # (n, 2) north, east [m/s]
     sigma: Array  # (n, 8) claimed standard deviations of PLANAR_STATES; 0 where not estimated
     nees: Array  # (n,) of the horizontal position, 2 degrees of freedom; NaN where the covariance is singular
+    relative: Array  # (n, 2) error of the horizontal position as the dock sees it [m]; NaN where no dock does
+    nees_relative: Array  # (n,) of that
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -46,6 +48,9 @@ class EstimateQuality:
     current_rms: float | None  # horizontal [m/s]
     nees_per_dof: float | None  # of the horizontal position; 1 is expected
     coverage_95: float | None  # share of truths inside the 95 % ellipse of the horizontal position
+    # As the dock sees it: by its own axis, so that the error of its compass, which turns both, does not count.
+    relative_rms: float | None = None  # [m]
+    nees_relative: float | None = None  # a degree of freedom
 
 
 def estimate_errors(log: VehicleLog) -> EstimateErrors:
@@ -54,13 +59,10 @@ def estimate_errors(log: VehicleLog) -> EstimateErrors:
     time, covariance = estimate["time"], estimate["covariance"]
     through_water = truth["nu"][:, [0, 1, 5]]
     through_water[:, :2] -= to_body(truth["quaternion"], truth["current"])[:, :2]
-    position = estimate["position"] - interpolate(time, truth["time"], truth["position"])
+    true_position = interpolate(time, truth["time"], truth["position"])
+    position = estimate["position"] - true_position
     heading = interpolate(time, truth["time"], np.unwrap(truth["attitude"][:, 2]))
-    nees = np.full(len(time), math.nan)
-    horizontal = covariance[:, :2, :2]
-    finite = np.isfinite(position[:, :2].sum(axis=1) + horizontal.sum(axis=(1, 2)))
-    regular = finite & (np.linalg.det(np.where(finite[:, None, None], horizontal, 0.0)) > 0.0)
-    nees[regular] = normalised_square(position[regular, :2], horizontal[regular])
+    relative, relative_covariance = _seen_by_dock(log, true_position[:, :2])
     return EstimateErrors(
         time=time,
         phase=phase_at(log, time),
@@ -70,7 +72,9 @@ def estimate_errors(log: VehicleLog) -> EstimateErrors:
         velocity=estimate["velocity"] - interpolate(time, truth["time"], through_water),
         current=estimate["current"] - interpolate(time, truth["time"], truth["current"][:, :2]),
         sigma=_sigma(log),
-        nees=nees,
+        nees=_nees(position[:, :2], covariance[:, :2, :2]),
+        relative=relative,
+        nees_relative=_nees(relative, relative_covariance),
     )
 
 
@@ -91,7 +95,7 @@ def estimate_quality(errors: EstimateErrors, phases: tuple[str, ...]) -> dict[st
     for name, part in parts.items():
         if name != "all" and not part.any():
             continue
-        nees = errors.nees[part & np.isfinite(errors.nees)]
+        nees, relative = (values[part & np.isfinite(values)] for values in (errors.nees, errors.nees_relative))
         qualities[name] = EstimateQuality(
             samples=int(part.sum()),
             position_rms=_rms(errors.position[part, :2]),
@@ -100,8 +104,47 @@ def estimate_quality(errors: EstimateErrors, phases: tuple[str, ...]) -> dict[st
             current_rms=_rms(errors.current[part]),
             nees_per_dof=float(nees.mean() / 2.0) if len(nees) else None,
             coverage_95=float((nees <= limit).mean()) if len(nees) else None,
+            relative_rms=_rms(errors.relative[part]),
+            nees_relative=float(relative.mean() / 2.0) if len(relative) else None,
         )
     return qualities
+
+
+def _nees(error: Array, covariance: Array) -> Array:
+    """NEES (n,) of errors (n, 2) with their covariances (n, 2, 2); NaN where one is singular or not finite."""
+    nees = np.full(len(error), math.nan)
+    finite = np.isfinite(error.sum(axis=1) + covariance.sum(axis=(1, 2)))
+    regular = finite & (np.linalg.det(np.where(finite[:, None, None], covariance, 0.0)) > 0.0)
+    nees[regular] = normalised_square(error[regular], covariance[regular])
+    return nees
+
+
+def _seen_by_dock(log: VehicleLog, position: Array) -> tuple[Array, Array]:
+    """Errors (n, 2) [m] of the horizontal position and covariances (n, 2, 2), in axes that the dock's compass turns.
+
+    A dock that takes its heading for too large by b turns all that it measures about its mouth by b, and its own axis
+    with it. So a vehicle that believes it is off by c sees itself at R(c - b) (p - mouth).
+
+    Args:
+        log: of the vehicle.
+        position: (n, 2) the true one [m].
+    """
+    covariance = log["estimate"]["covariance"]
+    if "usbl" not in log or not len(log["usbl"]["time"]):
+        return np.full_like(position, math.nan), np.full((len(position), 2, 2), math.nan)
+    dock, names = usbl_dock(log), log.table("estimate")["mean"].labels
+    off = np.angle(np.exp(1j * (log["usbl"]["value"][:, 3] - dock.heading)).mean())
+    from_mouth = log["estimate"]["position"][:, :2] - dock.position[:2]
+    state = names.index(DOCK_HEADING_BIAS) if DOCK_HEADING_BIAS in names else None
+    believed = np.zeros(len(position)) if state is None else log["estimate"]["mean"][:, state]
+    cos, sin = np.cos(believed - off), np.sin(believed - off)
+    turn = np.moveaxis(np.array([[cos, -sin], [sin, cos]]), -1, 0)  # (n, 2, 2)
+    slope = np.zeros((len(position), 2, covariance.shape[1]))
+    slope[:, :, :2] = turn
+    seen = (turn @ from_mouth[:, :, None])[:, :, 0]
+    if state is not None:
+        slope[:, :, state] = np.stack([-seen[:, 1], seen[:, 0]], axis=-1)
+    return seen - (position - dock.position[:2]), slope @ covariance @ slope.swapaxes(-1, -2)
 
 
 def _sigma(log: VehicleLog) -> Array:

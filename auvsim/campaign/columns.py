@@ -43,6 +43,8 @@ QUALITIES: Columns = {
     "current_rms": Metric("float", "m/s", "error of the estimated current, rms"),
     "nees_per_dof": Metric("float", "1", "mean NEES of the horizontal position a degree of freedom; 1 is consistent"),
     "coverage_95": Metric("float", "1", "share of estimates whose 95 % ellipse holds the truth"),
+    "relative_rms": Metric("float", "m", "error of the horizontal position as the dock's own axis shows it, rms"),
+    "nees_relative": Metric("float", "1", "mean NEES of that a degree of freedom"),
 }
 FIXES: Columns = {
     "fixes_sent": Metric("int", "1", "position fixes that the dock sent"),
@@ -158,7 +160,7 @@ def values_of(kind: str, summary: Mapping[str, Any] | None, error: Mapping[str, 
         values |= {name: found.get(name) for name in (*metrics_of(kind), *OUTCOME, *FIXES)}
         for phase, quality in summary["estimate"].items():
             end = "" if phase == "all" else f"_{phase}"
-            values |= {f"{name}{end}": quality[name] for name in QUALITIES}
+            values |= {f"{name}{end}": quality.get(name) for name in QUALITIES}
     if error is not None:
         values["failure"] = error["type"].lower() if error["type"] in ("Died", "Hung") else "error"
         values["failure_text"] = error["message"]

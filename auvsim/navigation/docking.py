@@ -46,6 +46,8 @@ DOPPLER_WALK = 4e-4
 GROSS = Outliers(prior=0.02, deviations=(15.0,))
 ANY = Outliers(prior=0.03, deviations=(2.0, 15.0))  # where fixes may be wrong by a few metres all the same
 
+LEARNING = 20.0  # as how many fixes the assumed share of outliers counts beside those heard
+
 
 class DockingNavigator:
     """A docking estimator in a run.
@@ -272,8 +274,9 @@ def robust(setup: NavigatorSetup) -> Navigator:
         currents=currents,
         switching=rates,
         initial=shares / shares.sum(),
-        outliers=Outliers(prior=s.outlier_probability, deviations=ANY.deviations),
+        outliers=Outliers(prior=s.outlier_probability, deviations=ANY.deviations, worth=LEARNING),
         echo=ECHO,
+        doubtful=True,
     )
     return navigator(setup, kind, replace(noise, biases={**compass, **noise.biases, **clock}))
 

@@ -44,6 +44,8 @@ class InteractingState(NamedTuple):
     verdicts: Verdicts = ()  # on this node's measurements, and revised ones
     angles: tuple[int, ...] = (2,)  # states that are angles
     last_accepted: float = math.nan  # stamp of the last of them that was more probably right [s]
+    wrong: float = 0.0  # sum of the probabilities of all of them that they were outliers
+    seen: int = 0  # their number
 
     @property
     def belief(self) -> Gaussian:
@@ -146,14 +148,15 @@ class InteractingModelFilter:
         return self._processes[int(state.weights.argmax())]
 
     def _weighed(self, state: InteractingState, fix: Measurement, model: MeasurementModel) -> InteractingState:
-        mixture = self._mixtures[fix.kind]
+        mixture = self._mixtures[fix.kind].after(state.wrong, state.seen)
         modes = [outliers.correct(belief, fix, model, mixture) for belief in state.beliefs]
         weights = imm.update(state.weights, [mode.log_likelihood for mode in modes])
         innovation = modes[int(weights.argmax())].innovation
         own = of_source(state.rejected, fix)
         rejected = without(state.rejected, own)
         count = state.outliers
-        is_wrong = bool(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)) > 0.5)
+        p = float(sum(w * mode.probability for w, mode in zip(weights, modes, strict=True)))
+        is_wrong, wrong, seen = p > 0.5, state.wrong + p, state.seen + 1
         # One that the filter would take, but only just, may as well confirm one that it did not take.
         if is_wrong or (own and innovation.nis > chi_square(PROBABLE, innovation.residual.size)):
             now = _rejected(state, fix, model, modes, innovation)
@@ -167,9 +170,11 @@ class InteractingModelFilter:
                 if self._recovery.fuses_both:
                     verdicts += tuple(found.taken for found in agreeing or (earlier,))
                     count -= len(agreeing)
+                wrong = max(wrong - p - len(agreeing), 0.0)
                 return InteractingState(
-                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles, fix.stamp
-                )
+                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles,
+                    fix.stamp, wrong, seen,
+                )  # fmt: skip
             if is_wrong:  # the first of them says when it began, the last ones what it is
                 first = own[:1] if self._echo else own[1 - REMEMBERED : 2 - REMEMBERED]
                 kept = (*first, *own[2 - REMEMBERED :]) if len(own) >= REMEMBERED else own
@@ -181,8 +186,9 @@ class InteractingModelFilter:
         verdicts = (*state.verdicts, (fix, OUTLIER if is_wrong else "", innovation.nis))
         last_accepted = state.last_accepted if is_wrong else fix.stamp
         return InteractingState(
-            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles, last_accepted
-        )
+            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles, last_accepted,
+            wrong, seen,
+        )  # fmt: skip
 
 
 def _apart(now: Rejected, agreeing: Sequence[Rejected]) -> Rejected:

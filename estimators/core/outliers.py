@@ -4,7 +4,7 @@ As probabilistic data association does with measurements of uncertain origin (Ba
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,10 +23,33 @@ class Outliers:
     prior: float = 0.03  # probability of each measurement
     # Of each component, in the measurement's unit; where components differ, one tuple of all components instead.
     deviations: tuple[float | tuple[float, ...], ...] = (3.0, 15.0)
+    # As how many measurements the prior counts in a filter that learns their share; None: it stays as it is.
+    worth: float | None = None
 
     def __post_init__(self) -> None:
         if not (0.0 < self.prior < 1.0 and self.deviations and min(np.min(d) for d in self.deviations) > 0.0):
             raise ParameterError(f"prior {self.prior} must lie in 0..1 and deviations {self.deviations} above 0")
+        if self.worth is not None and not self.worth > 0.0:
+            raise ParameterError(f"worth {self.worth} of an outliers' prior must lie above 0 measurements")
+
+    def after(self, wrong: float, seen: int) -> "Outliers":
+        """The same with the share that measurements since have taught: the mean of the beta distribution of it.
+
+        Args:
+            wrong: Sum of the probabilities of those seen that they were outliers.
+            seen: Their number.
+        """
+        if self.worth is None:
+            return self
+        return replace(self, prior=(self.worth * self.prior + wrong) / (self.worth + seen))
+
+    def covariance(self, size: int) -> Array:
+        """Covariance (m, m) that the chance of being an outlier adds to a measurement's noise: for one taken unchecked.
+
+        Raises:
+            ParameterError: There are more or fewer deviations than components.
+        """
+        return self.prior * sum(_spread(d, size) for d in self.deviations) / len(self.deviations)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

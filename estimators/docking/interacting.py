@@ -6,9 +6,10 @@ from typing import Unpack
 
 import numpy as np
 
+from estimators.core.history import Node
 from estimators.core.interacting import InteractingModelFilter, InteractingState
 from estimators.core.outliers import Outliers
-from estimators.core.types import Array
+from estimators.core.types import Array, Gaussian, Measurement
 from estimators.docking.models import ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
 from estimators.docking.recovery import FixRecovery
 from estimators.planar.model import PlanarParameters, PlanarProcess
@@ -29,6 +30,7 @@ class InteractingFilter(InteractingModelFilter):
         initial: Probabilities of the modes at the first fix (m,).
         outliers: Model of outliers among the fixes.
         echo: Time for which a false echo may show one place, which is no jump of the vehicle [s].
+        doubtful: Allow for a first fix that is an outlier in the covariance at the start.
         **options: See `PlanarModels`.
     """
 
@@ -42,6 +44,7 @@ class InteractingFilter(InteractingModelFilter):
         initial: Sequence[float] = (0.5, 0.5),
         outliers: Outliers | None = None,
         echo: float = 0.0,
+        doubtful: bool = False,
         **options: Unpack[ModelOptions],
     ) -> None:
         self.parameters, self.noise = parameters, noise
@@ -51,13 +54,23 @@ class InteractingFilter(InteractingModelFilter):
         def blended(weights: Array) -> PlanarProcess:
             return models.process_with(replace(noise, current=float(weights @ densities)))
 
+        mixture = outliers or Outliers()
+
+        def start(nodes: Sequence[Node[InteractingState]], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+            found = models.start(nodes, index)
+            if found is None or not doubtful or all(m.kind != USBL for m in found[1]):
+                return found
+            covariance = found[0].covariance.copy()
+            covariance[:2, :2] += mixture.covariance(2)
+            return Gaussian(mean=found[0].mean, covariance=covariance), found[1]
+
         super().__init__(
             [models.process_with(replace(noise, current=current)) for current in currents],
             models.sensors,
-            models.start,
+            start,
             switching=switching,
             initial=initial,
-            mixtures={USBL: outliers or Outliers()},
+            mixtures={USBL: mixture},
             recovery=FixRecovery(noise, echo),
             echo=echo,
             blended=blended,

@@ -36,6 +36,7 @@ FASTER = 0.3  # by how much homing is faster than an approach in a strong curren
 UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
 STEADY = 0.05  # deviation of a current that counts as known [m/s]
 RUSH = 0.5  # by how much that may exceed the speed of homing [m/s]
+PER_CURRENT = 3.0  # speed of an approach by that of the current, which may turn [-]
 AGAIN = 0.2  # how much faster each further attempt is [m/s]
 HOPELESS = 0.1  # speed over ground that is none [m/s]
 
@@ -180,12 +181,13 @@ class Docking(Mission):
     def _speed(self, here: Relative) -> float:
         """Speed through the water on an approach: the set one, or what the current asks for [m/s].
 
-        The way on which line of sight takes an error back does not depend on speed, the time does: the less steady the
-        current and the more attempts it has foiled, the faster.
+        The way on which line of sight takes an error back does not depend on speed, the time does: the stronger the
+        current, the less steady, and the more attempts it has foiled, the faster.
         """
         s = self._s
         unsteady = UNSTEADY_GAIN * max(here.unsteadiness - STEADY, 0.0) + AGAIN * (self.attempt - 1)
-        least = min(s.approach_speed + unsteady, max(s.homing_speed, s.approach_speed) + RUSH)
+        least = max(s.approach_speed, PER_CURRENT * math.hypot(*here.current)) + unsteady
+        least = min(least, max(s.homing_speed, s.approach_speed) + RUSH)
         crab = math.radians(s.crab_limit_deg)
         return speeds.speed_through_water(least, here.axis, here.current, s.ground_speed, crab, self._fastest)
 
