@@ -305,9 +305,9 @@ class Simulation:
     def log_contacts(self) -> None:
         """Logs the contacts of every vehicle, and their impulse so far."""
         for agent in self.agents:
-            impulse, tick = 0.0, 1.0 / self.scenario.rates.physics
+            impulse = 0.0
             for contact in self.world.contacts(agent.name):
-                impulse += contact.force * tick
+                impulse += contact.force * contact.duration
                 self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
 
     def _record_truths(self) -> None:
