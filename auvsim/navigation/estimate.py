@@ -3,6 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from types import MappingProxyType
 
 import numpy as np
@@ -58,9 +59,9 @@ class Estimate:
 
     def deviation(self, slopes: Mapping[str, float]) -> float:
         """Standard deviation of a quantity that changes by `slopes` with the named states; others do not count."""
-        places = [k for k, name in enumerate(self.names) if name in slopes]
-        slope = np.array([slopes[self.names[k]] for k in places])
-        return math.sqrt(max(float(slope @ self.covariance[np.ix_(places, places)] @ slope), 0.0))
+        found, block = _block(self.names, tuple(slopes))
+        slope = np.array([slopes[name] for name in found])
+        return math.sqrt(max(float(slope @ self.covariance[block] @ slope), 0.0))
 
     @property
     def horizontal_covariance(self) -> Array:
@@ -75,6 +76,13 @@ class Estimate:
         to_ned = np.array(((cos, -sin), (sin, cos)))
         over_ground = self.velocity[:2] + self.current @ to_ned
         return self.position[:2] + to_ned @ over_ground * dt, over_ground, heading
+
+
+@lru_cache(maxsize=64)
+def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[Array, ...]]:
+    """Those of the states that are wanted, in their order, and the index of their block in a covariance."""
+    places = [k for k, name in enumerate(names) if name in wanted]
+    return tuple(names[k] for k in places), np.ix_(places, places)
 
 
 def estimator_events(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:

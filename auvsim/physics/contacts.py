@@ -1,4 +1,4 @@
-"""Contacts of vehicles: what they touch, and with what force, tick by tick."""
+"""Contacts of vehicles: what they touch, and with what force, step by step."""
 
 import math
 from collections.abc import Iterable
@@ -9,15 +9,16 @@ import numpy as np
 
 
 class Contact(NamedTuple):
-    """Contact of a vehicle with one thing during one physics tick."""
+    """Contact of a vehicle with one thing during one step of the physics."""
 
-    time: float  # end of the tick [s]
+    time: float  # end of the step [s]
     force: float  # sum of the magnitudes of the contact forces, friction included [N]
     other: str  # instance name of what is touched, or `sea_floor`
+    duration: float  # of the step [s]
 
 
 class ContactRecorder:
-    """Sums the contact forces of each tick by vehicle and by what it touches.
+    """Sums the contact forces of each step by vehicle and by what it touches.
 
     Args:
         model: the compiled scene.
@@ -37,7 +38,7 @@ class ContactRecorder:
             contacts.clear()
 
     def record(self) -> None:
-        """Adds the contacts of the tick just made."""
+        """Adds the contacts of the step just made."""
         data, owners, totals = self._data, self._owners, {}
         force = self._force[:3]
         contacts = data.contact
@@ -52,7 +53,7 @@ class ContactRecorder:
                 totals[pair] = totals.get(pair, 0.0) + magnitude
         for (name, other), total in sorted(totals.items()):
             if total > 0.0 and name in self.found:
-                self.found[name].append(Contact(data.time, total, other))
+                self.found[name].append(Contact(data.time, total, other, self._model.opt.timestep))
 
 
 def _owner(model: mujoco.MjModel, geom: int) -> str:

@@ -31,7 +31,7 @@ def propulsion(model: str, speed: float, density: float) -> Propulsion:
     Raises:
         InputError: the vehicle cannot be used, or not at that speed.
     """
-    actuation = library.vehicle(model).actuation
+    actuation = library.actuation(model)
     if isinstance(actuation, Thrusters):
         level = _level(model, *library.source("vehicle", model), density)
         return Propulsion(

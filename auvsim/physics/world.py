@@ -86,9 +86,11 @@ class World:
             name: Craft(model, self.data, name, vehicle, slots[f"{name}/"]) for name, vehicle in scene.vehicles.items()
         }
         self.vehicles = tuple(self._craft)
+        self._substeps = 1  # of a physics step where something may be touched
         for name, structure in scene.structures.items():
             if structure.panel_contact is not None and self.vehicles:
-                panels.soften(model, name, self.vehicles, *structure.panel_contact)
+                substeps = panels.soften(model, name, self.vehicles, *structure.panel_contact)
+                self._substeps = max(self._substeps, substeps)
         self.models = scene.vehicles
         self._options, self._sensors = model.opt, self.data.sensordata
         active = self.data.eq_active
@@ -249,8 +251,7 @@ class World:
         self._options.disableflags = self._near_flags if near else self._far_flags
         if near:
             for _ in range(ticks):
-                self._step(1)
-                self._watch()
+                self._step_near()
         else:
             self._step(ticks)
         for craft in self._fleet:
@@ -277,6 +278,16 @@ class World:
         mujoco.mj_step(self.model, self.data, ticks)
         step = self._options.timestep
         self.data.time = round(self.data.time / step) * step  # MuJoCo adds steps up, and with them their rounding
+
+    def _step_near(self) -> None:
+        """One step in which contacts are recorded and latches may close, in substeps where panels ask for them."""
+        step = self._options.timestep
+        self._options.timestep = step / self._substeps
+        for _ in range(self._substeps):
+            self._step(1)
+            self._watch()
+        self._options.timestep = step
+        self.data.time = round(self.data.time / step) * step
 
     def _watch(self) -> None:
         """Records contacts, and closes an open latch on a free vehicle whose nose is in the throat."""

@@ -17,6 +17,7 @@ from auvsim.acoustics.network import Network
 from auvsim.acoustics.usbl import Usbl
 from auvsim.base.errors import DivergenceError
 from auvsim.base.frames import Array
+from auvsim.base.garbage import frozen_garbage
 from auvsim.base.interruption import HeldInterrupt
 from auvsim.base.randomness import stream
 from auvsim.data.log import Log
@@ -76,7 +77,7 @@ def run(
         check_steps(scenario)
     simulation, status = Simulation(scenario, seed, trial, path=path), "complete"
     log: Any = simulation.log
-    with log, HeldInterrupt() as interrupt:
+    with log, HeldInterrupt() as interrupt, frozen_garbage():
         try:
             last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
             while simulation.ticks < last and not simulation.over:
@@ -282,15 +283,15 @@ class Simulation:
     def _report_limits(self, time: float) -> None:
         """Logs vehicles that come out of the water or touch the sea floor."""
         world, before = self.world, time - 1.0 / self.scenario.rates.control
-        for agent in self.agents:
-            name = agent.name
-            for kind, holds, what in (
-                ("surfaced", world.surfaced(name), "part of the hull is out of the water"),
-                ("grounded", world.grounded(name, before), "touches the sea floor"),
-            ):
-                if holds and self._stretches.begins(time, name, kind):
-                    depth = float(self.truths[name].position[2])
-                    self.log.event(time, name, kind, f"{what}, depth {depth:.2f} m")
+        for name in self.truths:
+            if world.surfaced(name):
+                self._report_limit(time, name, "surfaced", "part of the hull is out of the water")
+            if world.grounded(name, before):
+                self._report_limit(time, name, "grounded", "touches the sea floor")
+
+    def _report_limit(self, time: float, name: str, kind: str, what: str) -> None:
+        if self._stretches.begins(time, name, kind):
+            self.log.event(time, name, kind, f"{what}, depth {float(self.truths[name].position[2]):.2f} m")
 
     def progress(self) -> ProgressState:
         """Progress of the run."""
@@ -305,9 +306,9 @@ class Simulation:
     def log_contacts(self) -> None:
         """Logs the contacts of every vehicle, and their impulse so far."""
         for agent in self.agents:
-            impulse, tick = 0.0, 1.0 / self.scenario.rates.physics
+            impulse = 0.0
             for contact in self.world.contacts(agent.name):
-                impulse += contact.force * tick
+                impulse += contact.force * contact.duration
                 self.log.append(f"vehicles/{agent.name}/contact", (contact.time, contact.force, impulse, contact.other))
 
     def _record_truths(self) -> None:

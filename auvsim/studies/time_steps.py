@@ -58,13 +58,13 @@ def contact(vehicle: str, dock: str, across: float, rate: float) -> tuple[float,
     """Largest force [N] and impulse [N s] of a vehicle that runs into a dock's cone at 1 m/s, in the first second."""
     pose = StructurePose(depth=DEPTH, heading=0.0)
     world = _world(vehicle, {"dock": (dock, pose)}, "implicitfast", rate)
-    found = library.vehicle(vehicle)
+    model = library.vehicle(vehicle)
     ahead = propulsion(vehicle, 1.0, DENSITY).ahead(1.0)
-    world.place(NAME, np.array([-found.nose - 0.1, across, DEPTH]), 0.0, 1.0, found.actuation.allocate(ahead))
+    world.place(NAME, np.array([-model.nose - 0.1, across, DEPTH]), 0.0, 1.0, model.actuation.allocate(ahead))
     world.advance(round(2.0 * rate))
-    force = np.array([touch.force for touch in world.contacts(NAME)])
-    first = np.array([touch.time for touch in world.contacts(NAME)]) < world.contacts(NAME)[0].time + 1.0
-    return float(force.max()), float(force[first].sum() / rate)
+    found = world.contacts(NAME)
+    first = [touch for touch in found if touch.time < found[0].time + 1.0]
+    return max(touch.force for touch in found), sum(touch.force * touch.duration for touch in first)
 
 
 def report(options: Options, progress: Progress | None = None) -> list[RenderableType]:

@@ -321,6 +321,20 @@ def vehicle(name: str) -> Vehicle:
     return Vehicle(model=root.model, root=root, source=text, actuation=actuation, nose=nose, length=nose - aftmost)
 
 
+def actuation(name: str) -> FinsAndShaft | Thrusters:
+    """What drives a vehicle, as `vehicle` reads it from its file; read once for each text of that.
+
+    Raises:
+        InputError: likewise.
+    """
+    return _actuation(name, *source("vehicle", name))
+
+
+@lru_cache(maxsize=16)
+def _actuation(name: str, path: Path, text: str) -> FinsAndShaft | Thrusters:
+    return vehicle(name).actuation
+
+
 def structure(name: str) -> Structure:
     """Loads a structure: `dock`, or the path of an MJCF file that keeps the contract of models/README.md.
 

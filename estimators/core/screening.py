@@ -32,7 +32,8 @@ class Screen:
     """
 
     def __init__(self, limits: Limits) -> None:
-        self.limits = limits
+        self._low, self._high, self._frozen = limits.low, limits.high, limits.frozen
+        self._rate, self._noise, self._period = limits.rate, limits.noise, limits.period
         self._stamp, self._value = -math.inf, math.nan  # the last good one
         self._doubtful: tuple[float, float] | None = None  # the last spike
         self._changed = -math.inf  # since when the sensor has shown `_shown`
@@ -42,10 +43,9 @@ class Screen:
 
     def judge(self, stamp: float, value: float) -> str:
         """The reason to refuse a value that was true at `stamp` [s]; "" if there is none."""
-        limits = self.limits
         if not (math.isfinite(value) and math.isfinite(stamp)):
             return "not_finite"
-        if not limits.low <= value <= limits.high:
+        if not self._low <= value <= self._high:
             return "impossible"
         if stamp <= self._latest:
             return "clock"
@@ -54,7 +54,7 @@ class Screen:
             return ""
         if value != self._shown:
             self._shown, self._changed = value, stamp
-        elif stamp - self._changed > limits.frozen:
+        elif stamp - self._changed > self._frozen:
             return "frozen"
         if self._jumps(stamp, value, self._stamp, self._value):
             doubtful, self._doubtful = self._doubtful, (stamp, value)
@@ -65,6 +65,6 @@ class Screen:
 
     def _jumps(self, stamp: float, value: float, before: float, last: float) -> bool:
         change = value - last
-        if self.limits.period is not None:
-            change = math.remainder(change, self.limits.period)
-        return abs(change) > self.limits.noise + self.limits.rate * (stamp - before)  # False of the first: NaN
+        if self._period is not None:
+            change = math.remainder(change, self._period)
+        return abs(change) > self._noise + self._rate * (stamp - before)  # False of the first: NaN

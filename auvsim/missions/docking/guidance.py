@@ -77,6 +77,7 @@ class Docking(Mission):
         self._returns = 0  # to a gate without an attempt counted
         self._phase_start = 0.0
         self._nearest = (math.inf, 0.0)  # least distance to the gate [m] and when that was [s]
+        self._paced: tuple[Relative | None, int, float] = (None, 0, 0.0)  # place and attempt of the last speed, and it
         self._occupant: str | None = None  # another vehicle in the dock, as reported in its packets
 
     @property
@@ -184,12 +185,16 @@ class Docking(Mission):
         The way on which line of sight takes an error back does not depend on speed, the time does: the stronger the
         current, the less steady, and the more attempts it has foiled, the faster.
         """
+        if self._paced[0] is here and self._paced[1] == self.attempt:
+            return self._paced[2]
         s = self._s
         unsteady = UNSTEADY_GAIN * max(here.unsteadiness - STEADY, 0.0) + AGAIN * (self.attempt - 1)
         least = max(s.approach_speed, PER_CURRENT * math.hypot(*here.current)) + unsteady
         least = min(least, max(s.homing_speed, s.approach_speed) + RUSH)
         crab = math.radians(s.crab_limit_deg)
-        return speeds.speed_through_water(least, here.axis, here.current, s.ground_speed, crab, self._fastest)
+        speed = speeds.speed_through_water(least, here.axis, here.current, s.ground_speed, crab, self._fastest)
+        self._paced = here, self.attempt, speed
+        return speed
 
     def _homing_speed(self, here: Relative) -> float:
         s = self._s

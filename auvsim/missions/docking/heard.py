@@ -29,7 +29,8 @@ class Heard(DockReports):
     def observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's packets and the ranges among readings."""
         super().observe(readings)
-        self.last = max([self.last, *(r.received for r in readings if r.sensor in self._ranges)])
+        if self._ranges:
+            self.last = max([self.last, *(r.received for r in readings if r.sensor in self._ranges)])
 
     def judge(self, estimate: Estimate) -> None:
         """Takes what the estimator made of the fixes since its last estimate."""

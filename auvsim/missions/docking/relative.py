@@ -35,6 +35,26 @@ class Relative(NamedTuple):
         return wrap(self.heading - self.axis)
 
 
+class _Held(NamedTuple):
+    """What an estimate says until the next one, as plain numbers."""
+
+    position: tuple[float, float]  # north, east [m]
+    velocity: tuple[float, float]  # surge and sway through the water [m/s]
+    current: tuple[float, float]  # north, east [m/s]
+    knows_current: bool
+    compass_bias: float  # [rad]
+    dock_heading_bias: float  # [rad]
+    depth_bias: float  # [m]
+
+    @classmethod
+    def of(cls, estimate: Estimate) -> "_Held":
+        """The numbers of an estimate."""
+        (north, east, _), (surge, sway, _) = estimate.position.tolist(), estimate.velocity.tolist()
+        biases = (estimate.value(name) for name in (COMPASS_BIAS, DOCK_HEADING_BIAS, DEPTH_BIAS))
+        current = float(estimate.current[0]), float(estimate.current[1])
+        return cls((north, east), (surge, sway), current, "current_north" in estimate.names, *biases)
+
+
 class Locator:
     """Carries the last estimate on to now and puts it into the dock's frame.
 
@@ -53,6 +73,7 @@ class Locator:
         self._unsteadiness: float | None = None
         self._judged = (-math.inf, 0.0, 0.0)  # time of the last estimate and deviations of `cross` and `below` then
         self._drift: tuple[float, float] | None = None  # the current where the estimate has none [m/s]
+        self._last: tuple[Estimate, _Held] | None = None  # the last estimate, and what it says
 
     def commanded(self, speed: float) -> None:
         """Takes the speed through the water that is commanded [m/s]."""
@@ -72,18 +93,17 @@ class Locator:
             axis: As the dock reports it [rad].
             depth: Of the mouth, likewise [m].
         """
-        compass_bias, turned = estimate.value(COMPASS_BIAS), estimate.value(DOCK_HEADING_BIAS)
-        depth_bias = estimate.value(DEPTH_BIAS)
+        if self._last is None or self._last[0] is not estimate:
+            self._last = estimate, _Held.of(estimate)
+        position, (u, v), current, knows_current, compass_bias, turned, depth_bias = self._last[1]
         heading, axis = wrap(compass - compass_bias), wrap(axis - turned)
         cos, sin = math.cos(heading), math.sin(heading)
-        u, v, _ = estimate.velocity.tolist()
-        current = (float(estimate.current[0]), float(estimate.current[1]))
         velocity = (u * cos - v * sin + current[0], u * sin + v * cos + current[1])
-        if "current_north" not in estimate.names:
+        if not knows_current:
             current = self._drifting(velocity, cos, sin)
         dt = time - estimate.time
-        north = float(estimate.position[0]) + velocity[0] * dt + self._nose * cos - self._mouth[0]
-        east = float(estimate.position[1]) + velocity[1] * dt + self._nose * sin - self._mouth[1]
+        north = position[0] + velocity[0] * dt + self._nose * cos - self._mouth[0]
+        east = position[1] + velocity[1] * dt + self._nose * sin - self._mouth[1]
         ca, sa = math.cos(axis), math.sin(axis)
         along, cross = north * ca + east * sa, east * ca - north * sa
         if estimate.time > self._judged[0]:  # covariances do not change between estimates
