@@ -11,7 +11,7 @@ from pydantic import Field
 from auvsim.acoustics import propagation
 from auvsim.acoustics.medium import Medium
 from auvsim.acoustics.message import Message
-from auvsim.acoustics.modem import Modem
+from auvsim.acoustics.presets import Modem
 from auvsim.base.frames import Array
 from auvsim.base.randomness import Noise
 from auvsim.base.settings import Settings

@@ -1,11 +1,11 @@
-"""Acoustic modems: what they can do, by presets of real ones, and what they send by themselves."""
+"""Settings of acoustic modems: what they can do, by presets of real ones, and what they send by themselves."""
 
-from dataclasses import dataclass
+from dataclasses import fields, replace
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from auvsim.acoustics.presets import PRESETS, Preset
+from auvsim.acoustics.presets import PRESETS, Modem
 from auvsim.base.settings import Settings
 
 Offset = Annotated[float, Field(ge=-20.0, le=20.0)]  # from the body's origin [m]
@@ -67,38 +67,13 @@ class ModemSettings(Settings):
     ask: AskSettings = AskSettings()
 
     @property
-    def modem(self) -> "Modem":
+    def modem(self) -> Modem:
         """The preset's numbers, with those given in their place."""
-        preset = PRESETS[self.preset]
-        given = {name: getattr(self, name) for name in Preset._fields if hasattr(self, name)}
-        return Modem(**{name: getattr(preset, name) if value is None else value for name, value in given.items()})
+        own = {field.name: getattr(self, field.name) for field in fields(Modem)}
+        return replace(PRESETS[self.preset], **{name: value for name, value in own.items() if value is not None})
 
     @model_validator(mode="after")
     def _decodes(self) -> "ModemSettings":
         if (jitter := self.modem.processing_jitter) > (processing := self.modem.processing):
             raise ValueError(f"processing_jitter is {jitter} s, it must not exceed processing, {processing} s")
         return self
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Modem:
-    """What a modem can do; units as in `ModemSettings`."""
-
-    bit_rate: float
-    preamble: float
-    frequency: float
-    bandwidth: float
-    source_level: float
-    coding_gain: float
-    processing: float
-    processing_jitter: float
-    timing_noise: float
-    bearing_noise_deg: float | None  # None: it measures none
-
-    def duration(self, bits: float) -> float:
-        """Duration of a packet [s]."""
-        return self.preamble + bits / self.bit_rate
-
-    def hears(self, other: "Modem") -> bool:
-        """Whether the bands of two modems overlap; else they neither hear nor disturb each other."""
-        return abs(self.frequency - other.frequency) < 0.5 * (self.bandwidth + other.bandwidth)

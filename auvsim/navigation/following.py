@@ -9,13 +9,13 @@ import numpy as np
 
 from auvsim.acoustics.message import Delivery
 from auvsim.base.alpha_beta import AlphaBeta
-from auvsim.base.errors import InputError
 from auvsim.base.reading import Reading
 from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.heard import Listener, Sight
 from auvsim.navigation.measurements import averaged, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.odometry import planned_start, required
 from auvsim.navigation.over_history import OverHistory
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
@@ -42,9 +42,8 @@ class RangeNavigator(OverHistory):
 
     def __init__(self, setup: NavigatorSetup) -> None:
         s = setup.settings
-        if setup.modem is None or not of_kind(setup.sensors, DvlSettings):
-            lacks = "a modem (modem: {})" if setup.modem is None else "a DVL (sensors.dvl.enabled: true)"
-            raise InputError(f"estimator 'range_ekf' of '{setup.vehicle}': needs {lacks}")
+        required(setup, ("a DVL (sensors.dvl.enabled: true)", bool(of_kind(setup.sensors, DvlSettings))))
+        assert setup.modem is not None
         self._settings, self._modem, self._sensors = s, setup.modem, dict(setup.sensors)
         compass = setup.sensors.get("compass")
         self._compass_bias = math.radians(
@@ -67,8 +66,7 @@ class RangeNavigator(OverHistory):
             WATER: sensors.dvl(motion, track="water"),
             RANGE: sensors.range_to(motion, point=setup.modem.transducer[:2]),
         }
-        start_north, start_east = setup.start
-        self._origin = (start_north if s.north is None else s.north, start_east if s.east is None else s.east)
+        self._origin = planned_start(setup)
         filter_ = ModelFilter(MotionProcess(motion, noise), models, self._start, gates=0.9999)
         self._estimator = Estimator(filter_, step=setup.period)
         self.reset()

@@ -60,7 +60,7 @@ class Odometry:
 
 
 def required(setup: NavigatorSetup, *needs: tuple[str, bool]) -> None:
-    """Sees that a follower has a modem, and what else its estimator needs.
+    """Sees that a follower has a modem and somebody to hear, and what else its estimator needs.
 
     Args:
         setup: Of the estimator.
@@ -69,7 +69,8 @@ def required(setup: NavigatorSetup, *needs: tuple[str, bool]) -> None:
     Raises:
         InputError: Something is missing.
     """
-    for what, given in (("a modem (modem: {})", setup.modem is not None), *needs):
+    heard = ("another vehicle with a modem (vehicles.NAME.modem: {}), of which there is none", bool(setup.others))
+    for what, given in (("a modem (modem: {})", setup.modem is not None), heard, *needs):
         if not given:
             raise InputError(f"estimator '{setup.settings.kind}' of '{setup.vehicle}': needs {what}")
 

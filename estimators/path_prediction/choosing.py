@@ -2,7 +2,8 @@
 
 SC-RT is better as long as the leader goes where it is predicted to go, SC-EKF when it turns and packets are lost. Each
 runs by itself; the odds are the likelihood ratio of the pulses that both have used, tempered because errors along a run
-are correlated, and fading so that a leader may change its ways.
+are correlated, fading so that a leader may change its ways, and bounded for each pulse: where both have lost their
+heading, one pulse that surprises one of them says nothing of which is nearer.
 """
 
 import math
@@ -15,9 +16,10 @@ from estimators.path_prediction.follower import Follower
 from estimators.path_prediction.messages import Packet, Pulse
 from estimators.path_prediction.real_time import RealTimeFilter
 
-FADING = 0.97  # of the evidence, a pulse
+FADING = 0.99  # of the evidence, a pulse
 TEMPER = 0.3  # of the likelihood
-PRIOR = -2.0  # log-odds of SC-EKF over SC-RT: it has foretold a pulse with a packet more
+LARGEST = 2.0  # log-likelihood ratio of one pulse
+PRIOR = -1.0  # log-odds of SC-EKF over SC-RT: it has foretold a pulse with a packet more
 SATURATED = 50.0  # log-odds beyond which the weight no longer changes
 
 
@@ -77,4 +79,5 @@ class ChoosingFilter(Follower):
         """Takes the evidence of pulses that both have used by now, once."""
         one, other = (member.fit for member in self.members)
         for number in sorted(one.keys() & other.keys()):
-            self._evidence = FADING * self._evidence + one.pop(number) - other.pop(number)
+            ratio = one.pop(number) - other.pop(number)
+            self._evidence = FADING * self._evidence + min(max(ratio, -LARGEST), LARGEST)

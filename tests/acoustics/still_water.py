@@ -5,7 +5,7 @@ import numpy as np
 from auvsim.acoustics.channel import ChannelSettings, Instant, SharedChannel
 from auvsim.acoustics.medium import Medium
 from auvsim.acoustics.message import Message
-from auvsim.acoustics.modem import Modem
+from auvsim.acoustics.presets import Modem
 from auvsim.base.randomness import stream
 
 LOUD = Modem(

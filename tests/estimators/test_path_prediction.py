@@ -421,11 +421,15 @@ def test_bearings_show_what_ranges_do_not_when_in_line():
 def test_choice_goes_to_the_member_that_foretells_the_pulses():
     start = Gaussian(mean=FIRST, covariance=START)
     both = ChoosingFilter(CloningFilter(start, NOISE), RealTimeFilter(start, NOISE, LEADER_NOISE))
-    assert both.weight == pytest.approx(1.0 / (1.0 + math.exp(2.0)))
-    for number in range(30):
-        both.members[0].fit[number], both.members[1].fit[number] = -1.0, -4.0
+    assert both.weight == pytest.approx(1.0 / (1.0 + math.exp(1.0)))
+    both.members[0].fit[0], both.members[1].fit[0] = -1.0, -101.0
+    both._judge()  # one pulse, which says no more than a ratio of 2
+    assert both.weight == pytest.approx(1.0 / (1.0 + math.exp(1.0 - 0.3 * 2.0)))
+    for number in range(1, 30):
+        both.members[0].fit[number], both.members[1].fit[number] = -1.0, -2.5
         both._judge()
-    assert both.weight > 0.99
+    evidence = 2.0 * 0.99**29 + 1.5 * (1.0 - 0.99**29) / (1.0 - 0.99)
+    assert both.weight == pytest.approx(1.0 / (1.0 + math.exp(1.0 - 0.3 * evidence)))
     both.members[0].mean[:2] += 10.0
     found = both.belief
     w, apart = both.weight, both.members[0].mean[:3] - both.members[1].mean[:3]

@@ -221,6 +221,11 @@ def test_a_range_filter_without_modem_or_log_is_refused():
             Simulation(scenario.parse(whole), seed=0)
 
 
+def test_a_follower_with_nobody_to_hear_is_refused():
+    with pytest.raises(InputError, match=r"'follower': needs another vehicle with a modem .*, of which there is none"):
+        Simulation(plan(vehicles={"leader": {"modem": None}}), seed=0)
+
+
 def test_a_beacon_over_the_horizon_is_out_of_reach():
     """80 km away nothing is received, and the reason is noise."""
     values = plan(70.0).model_dump(mode="json")

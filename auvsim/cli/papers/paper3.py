@@ -2,7 +2,7 @@
 
 import math
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,13 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from auvsim.base.errors import InputError
 from auvsim.cli.papers import verdicts
 from auvsim.cli.report import StudyProgress
 from auvsim.cli.run import output_folder
 from auvsim.reproduce.paper3 import acceptance, claims, figures, products
 from auvsim.reproduce.paper3 import study as paper3
 from auvsim.reproduce.paper3.methods import METHODS
-from auvsim.reproduce.paper3.study import ROWS
+from auvsim.reproduce.paper3.study import MUJOCO, ROWS
 
 WIDTH = 150  # of the widest table [columns]
 SHOWN = ("dr", "ekf", "dekf", "iiru", "sc", "rt", "choosing", "oracle")
@@ -34,19 +33,18 @@ NORMS = (
 
 
 def run(*, quick: bool, seed: int, out: Path, jobs: int | None, truth: str | None = None) -> int:
-    """Runs the study on the planar truth, prints it and fills the folder.
+    """Runs the study on the truth asked for, or on both; prints it and fills the folder.
 
     Returns:
         The exit code.
 
     Raises:
-        InputError: For a folder that cannot be written to, or another truth.
+        InputError: For a folder that cannot be written to.
     """
-    if truth not in (None, "planar"):
-        raise InputError(f"paper3 has no study on the truth '{truth}'; it has one on planar")
+    rows = [name for name in ROWS if truth is None or name.startswith(MUJOCO) == (truth == "mujoco")]
     with output_folder(out):
         with StudyProgress() as progress:
-            study = paper3.reproduce(seed, quick=quick, jobs=jobs, progress=progress)
+            study = paper3.reproduce(seed, quick=quick, jobs=jobs, rows=rows, progress=progress)
         written = products.write(study, out)
     show(study)
     print(f"written: {', '.join(str(path) for path in written)}", file=sys.stderr)
@@ -63,6 +61,8 @@ def show(study: paper3.Study) -> None:
     console.print(csv_table("paper 3, table 2: error of the follower at 1000 s", products.table2_rows(study)))
     console.print(NORMS)
     console.print(claims_table(study))
+    for line in loss_lines(study):
+        console.print(line)
     if math.isfinite(limit := figures.threshold(study)):
         console.print(f"A delay of packets counts as noise up to {limit:.1f} s: then ignoring it costs 10 %.")
     console.print(verdicts.table("paper 3", judged, {name: row.title for name, row in ROWS.items()}))
@@ -84,6 +84,15 @@ def study_table(study: paper3.Study) -> Table:
         count = len(next(iter(results.values())).final)
         table.add_row(ROWS[name].title, str(count), *cells)
     return table
+
+
+def loss_lines(study: paper3.Study) -> Iterator[str]:
+    """What the loss of 60 % of the packets costs, for each noise set that was run."""
+    for noise in ("fine", "paper"):
+        if {f"loss_{noise}_60%", f"loss_{noise}_0%"} <= study.results.keys():
+            lossy, whole = (study.results[f"loss_{noise}_{loss}"] for loss in ("60%", "0%"))
+            found = (f"{METHODS[key].title} {lossy[key].rms / whole[key].rms:.2f}" for key in ("sc", "rt"))
+            yield f"60 % of packets lost, {noise} noise, rms over that without loss: {', '.join(found)}."
 
 
 def _number(value: float) -> str:

@@ -5,6 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from auvsim.reproduce.paper3 import yardsticks
+from auvsim.reproduce.paper3.follow import Track
 from auvsim.reproduce.paper3.truths import DETECTION, SOUND, Run
 from estimators.path_prediction.choosing import ChoosingFilter
 from estimators.path_prediction.cloning import CloningFilter
@@ -15,18 +17,19 @@ from estimators.path_prediction.iiru import IncoordinateIntervalFilter
 from estimators.path_prediction.real_time import RealTimeFilter
 
 
-@dataclass(frozen=True, kw_only=True, slots=True)
-class Method:
-    """One column of the study."""
-
-    title: str
-    make: Callable[[Run], Follower]
-    prompt: bool = False  # follows the run without delay
-
-
 def dead_reckoning(run: Run) -> Follower:
     """Of the follower's odometry."""
     return DeadReckoning(run.start, run.noise.follower, bends=True)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Method:
+    """One column of the study: a follower, or what makes a track of the whole run by itself."""
+
+    title: str
+    make: Callable[[Run], Follower] = dead_reckoning  # not of a yardstick
+    prompt: bool = False  # follows the run without delay
+    track: Callable[[Run], Track] | None = None  # of a yardstick
 
 
 def delay_ignoring(run: Run, **options: Any) -> Follower:
@@ -84,4 +87,6 @@ METHODS = {
     "rt": Method(title="SC-RT", make=real_time),
     "choosing": Method(title="choosing", make=choosing),
     "oracle": Method(title="oracle", make=cloning, prompt=True),
+    "map": Method(title="batch MAP", track=yardsticks.most_probable),
+    "particle": Method(title="particle filter", track=yardsticks.particle),
 }

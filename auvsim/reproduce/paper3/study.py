@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.reproduce.paper3.follow import follow
+from auvsim.reproduce.paper3.follow import Track, follow
 from auvsim.reproduce.paper3.methods import METHODS
 from auvsim.reproduce.paper3.truths import (
     NOISES,
@@ -20,6 +20,7 @@ from auvsim.reproduce.paper3.truths import (
     START,
     STEP,
     Conditions,
+    Run,
     simulate,
     undelayed,
 )
@@ -99,9 +100,23 @@ def _rows() -> dict[str, Row]:
             conditions = Conditions(scene=scene, ranged=ranged, bearing=math.radians(bearing))
             title = f"fine noise, process, {scene}, {name.replace('_', ' and ')}"
             rows[f"usbl_{scene}_{name}"] = Row(title=title, conditions=conditions, methods=usbl)
+    for noise in NOISES:
+        rows[f"yardsticks_{noise}"] = Row(
+            title=f"{noise} noise, process, weave, with yardsticks",
+            conditions=Conditions(noise=noise),
+            methods=("iiru", "sc", "rt", "choosing", "oracle", "map", "particle"),
+            runs=30,
+            quick_runs=2,
+        )
+    for scene in ("weave", "lweave"):
+        for name, loss, delay in (("", 0.0, 15.0), ("_60%", 0.6, 15.0), ("_late", 0.0, 60.0)):
+            conditions = Conditions(scene=scene, mode="sensor", carried=True, loss=loss, delay=delay)
+            title = f"MuJoCo, fine noise, {scene}, {conditions.loss:.0%} lost, packets {conditions.delay:g} s late"
+            rows[f"{MUJOCO}{scene}{name}"] = Row(title=title, conditions=conditions, methods=MAIN, quick_runs=2)
     return rows
 
 
+MUJOCO = "mujoco_"  # begins the names of rows on physical truth
 ROWS = _rows()
 POOLED = "paper_process_weave"  # the row of tables 2, in which the order of the paper holds
 POOLED_RUNS = 250
@@ -197,10 +212,7 @@ def block(
         inversions += sum(n < max(order[:k], default=-1) for k, n in enumerate(order))
         own = (run.leader_own[-1] - run.leader[-1])[:2]
         for key in methods:
-            method = METHODS[key].make(run)
-            began = time.process_time()
-            track = follow(method, undelayed(run) if METHODS[key].prompt else run)
-            cpu, size = time.process_time() - began, len(pickle.dumps(method))
+            track, cpu, size = _followed(key, run)
             columns = (
                 track.errors[-1],
                 (track.errors**2).sum(axis=1),
@@ -214,6 +226,17 @@ def block(
             )
             found[key].append(Runs(*(np.array([column], dtype=float) for column in columns)))
     return {key: joined(each) for key, each in found.items()}, inversions
+
+
+def _followed(key: str, run: Run) -> tuple[Track, float, float]:
+    """Track of a method, CPU time [s], and size of its state [byte]; NaN of a yardstick."""
+    method, began = METHODS[key], time.process_time()
+    if method.track is not None:
+        return method.track(run), time.process_time() - began, math.nan
+    follower = method.make(run)
+    began = time.process_time()
+    track = follow(follower, undelayed(run) if method.prompt else run)
+    return track, time.process_time() - began, len(pickle.dumps(follower))
 
 
 def joined(parts: Sequence[Runs]) -> Runs:

@@ -50,6 +50,7 @@ class Conditions:
 
     scene: Scene = "weave"
     mode: Mode = "process"  # process: the truth is noisy, odometry the command; sensor: the other way round
+    carried: bool = False  # by MuJoCo, instead of as commanded; for the mode sensor
     noise: str = "fine"  # which of NOISES
     duration: float = 1000.0  # [s]
     period: float = 10.0  # of the pulses [s]
@@ -133,6 +134,10 @@ def simulate(conditions: Conditions, seed: int, number: int) -> Run:
     noise = NOISES[conditions.noise]
     poses, owns, odometry = [], [], []
     first_l, motion_l, first_f, motion_f = commands(conditions.scene, steps)
+    if conditions.carried:
+        from auvsim.reproduce.paper3.physical import carried  # MuJoCo is loaded where it is needed
+
+        first_l, motion_l, first_f, motion_f = carried(conditions.scene, steps, seed, number)
     for name, first, motion, q in (
         ("leader", first_l, motion_l, noise.leader),
         ("follower", first_f, motion_f, noise.follower),
