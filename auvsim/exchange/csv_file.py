@@ -37,7 +37,7 @@ def write(log: Log, path: Path) -> list[Path]:
     return written
 
 
-def _columns(log: VehicleLog, plan: VehicleSettings) -> Iterator[tuple[str, Sequence[Any]]]:
+def _columns(log: VehicleLog, plan: VehicleSettings) -> Iterator[tuple[str, Any]]:
     """Columns (n,) by header; a group's times stand before it."""
     if "feedback" not in log or len(log["feedback"]["time"]) < 2:
         raise InputError(f"'{log.name}' has no readings of its actuators in the log: CSV needs `sensors.feedback`")

@@ -24,7 +24,8 @@ def write(log: Log, path: Path) -> list[Path]:
         for name, values in columns.items():
             _put(whole_log, [*group.split("/"), name], values)
             variable = log.tables.get(group, {}).get(name)
-            _put(units, [*group.split("/"), name], variable.units if variable else "")
+            if variable is not None and variable.units:
+                _put(units, [*group.split("/"), name], variable.units)
     for group, attributes in log.group_attributes.items():
         for name, value in attributes.items():
             _put(whole_log, [*group.split("/"), "attributes", name], value)

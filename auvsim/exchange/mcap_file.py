@@ -25,7 +25,7 @@ def write(log: Log, path: Path) -> list[Path]:
         from mcap.writer import Writer
     except ImportError:
         raise InputError(types.NEEDED) from None
-    found = [stream for stream in _streams(log)]
+    found = _streams(log)
     store, definitions = types.store(), {}
     queue: list[tuple[int, int, int, bytes]] = []  # when recorded [ns], topic, stamp [ns], bytes
     for k, stream in enumerate(found):

@@ -1,8 +1,8 @@
 """One vehicle's log as ROS 2 messages: truth and estimate as odometry, every sensor as its driver would publish it.
 
-World frame `map`: east, north, up from the datum. Body frame `NAME/base_link`: forward, port, up. Rudder and planes keep
-the log's signs (a positive rudder turns to starboard), as joints have axes of their own; the DVL's message is forward,
-starboard, down by its own definition. Stamps are the simulated time at which a reading was true; messages are recorded
+World frame `map`: east, north, up from the datum. Body frame `NAME/base_link`: forward, port, up. Rudder and planes
+keep the log's signs (a positive rudder turns to starboard), as joints have axes of their own; the DVL's message is
+forward, starboard, down by its own definition. Stamps are the simulated time at which a reading was true; messages are recorded
 when they arrived, lost ones never. Variances are those of the sensors' data sheets, noise and bias together.
 """
 
@@ -175,7 +175,7 @@ def _satellite(ros: Ros, t: float, frame: str, place: Array, datum: Datum, varia
 
 
 def _estimates(ros: Ros, log: VehicleLog, depth_variance: float) -> Rows:
-    """Odometry of the estimate once it is initialised: velocity over ground, from that through the water and current."""
+    """Odometry of the estimate once it is initialised: velocity over ground by that through the water and current."""
     columns = log["estimate"]
     names = log.table("estimate")["mean"].labels
     keys = ("time", "position", "heading", "velocity", "current", "covariance", "initialised")

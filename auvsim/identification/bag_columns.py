@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, quaternion_to_euler
@@ -18,6 +19,7 @@ from auvsim.ros.frames import enu, enu_quaternion
 LATE = 0.01  # between a header's stamp and receipt, from which it is told [s]
 _TRUTH = {"truth", "ground_truth"}  # in the name of a topic: no sensor, used only where a map says so
 _ROWS = "stamps"  # the column of time of all that is used
+Stamps = NDArray[np.int64]
 Derived = dict[str, Array]  # values (n,) by quantity, in the first unit of its kind
 
 
@@ -139,7 +141,7 @@ def _columns(
         name, field = _split(given.column, topics)
         topic = topics[name]
         clock = given.time or f"{name}.{'received' if topic.stamps is None else 'stamp'}"
-        if clock not in clocks:
+        if clock not in clocks or clock.rpartition(".")[0] != name:
             clocks[clock], more = _clock(path, topic, clock)
             notes += more
         own = field in derived[name]
@@ -160,7 +162,7 @@ def _columns(
     return columns, notes
 
 
-def _clock(path: Path, topic: Topic, clock: str) -> tuple[Array, list[str]]:
+def _clock(path: Path, topic: Topic, clock: str) -> tuple[Stamps, list[str]]:
     """Times of a topic's messages (n,) [ns], and notes on them."""
     if clock == f"{topic.name}.received":
         note = [] if topic.stamps is not None else [f"{path.name}: {topic.name} has no stamps: times are of receipt"]
@@ -169,17 +171,19 @@ def _clock(path: Path, topic: Topic, clock: str) -> tuple[Array, list[str]]:
         raise InputError(f"{path}: time: '{clock}': give {topic.name}.received, or {topic.name}.stamp with a header")
     if not topic.stamps.any():
         raise InputError(
-            f"{path}: {topic.name} ({topic.type}): the stamps of its headers are all 0; let the driver set them, or say "
-            f"`time: {topic.name}.received` of that quantity in a --columns file"
+            f"{path}: {topic.name} ({topic.type}): the stamps of its headers are all 0; let the driver set them, or "
+            f"say `time: {topic.name}.received` of that quantity in a --columns file"
         )
     late = 1e-9 * (topic.received - topic.stamps)
     if float(np.abs(late).max()) < LATE:
         return topic.stamps, []
-    text = f"received {np.median(late):.3g} s after its headers' stamps (median; {late.min():.3g} to {late.max():.3g} s)"
+    text = (
+        f"received {np.median(late):.3g} s after its headers' stamps (median; {late.min():.3g} to {late.max():.3g} s)"
+    )
     return topic.stamps, [f"{path.name}: {topic.name} {text}: the stamps count"]
 
 
-def _same_clock(path: Path, clocks: Mapping[str, Array]) -> None:
+def _same_clock(path: Path, clocks: Mapping[str, Stamps]) -> None:
     """Sees that all times overlap.
 
     Raises:
