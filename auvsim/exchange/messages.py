@@ -2,8 +2,8 @@
 
 World frame `map`: east, north, up from the datum. Body frame `NAME/base_link`: forward, port, up. Rudder and planes
 keep the log's signs (a positive rudder turns to starboard), as joints have axes of their own; the DVL's message is
-forward, starboard, down by its own definition. Stamps are the simulated time at which a reading was true; messages are recorded
-when they arrived, lost ones never. Variances are those of the sensors' data sheets, noise and bias together.
+forward, starboard, down by its own definition. Stamps are the simulated time at which a reading was true; messages are
+recorded when they arrived, lost ones never. Variances are those of the sensors' data sheets, noise and bias together.
 """
 
 import math

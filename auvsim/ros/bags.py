@@ -132,15 +132,15 @@ def _paths(store: Any, kind: str, before: str = "") -> Iterator[tuple[str, Calla
     """Paths to the numbers of a message, and what gets each."""
     from rosbags.interfaces import Nodetype
 
-    fields: list[tuple[str, tuple[Any, Any]]] = store.fielddefs[kind][1]
+    fields: Any = store.fielddefs[kind][1]
     for name, (node, what) in fields:
         path = f"{before}{name}"
         if _is_number((node, what)):
             yield path, attrgetter(path)
         elif node == Nodetype.NAME and what != "std_msgs/msg/Header":
             yield from _paths(store, what, f"{path}.")
-        elif node == Nodetype.ARRAY and what[1] <= _LONGEST and _is_number(what[0]):
-            yield from ((f"{path}[{k}]", lambda m, get=attrgetter(path), k=k: get(m)[k]) for k in range(what[1]))
+        elif node == Nodetype.ARRAY and _is_number(what[0]) and int(what[1]) <= _LONGEST:
+            yield from ((f"{path}[{k}]", lambda m, get=attrgetter(path), k=k: get(m)[k]) for k in range(int(what[1])))
 
 
 def _is_number(what: Any) -> bool:
