@@ -74,7 +74,9 @@ QUANTITIES: dict[str, Quantity] = {
     "wind_speed": Quantity("speed", "wind_speed apparent_wind_speed aws", "wind anemometer"),
     "wind_from": Quantity("angle", "wind_from apparent_wind_angle awa", "wind anemometer"),
     "manoeuvre": Quantity("text", "manoeuvre maneuver manoeuver run segment test trial"),
+    "namespace": Quantity("text", ""),  # of the topics of a bag that count
 }
+NAMESPACE = "namespace"
 _BY_ALIAS = {alias: name for name, quantity in QUANTITIES.items() for alias in quantity.aliases.split()}
 
 
@@ -122,6 +124,11 @@ def split_header(header: str) -> tuple[str, str | None]:
         if len(parts) > count and _spelled(unit) is not None and len(unit) > 1:
             return "_".join(parts[:-count]), unit
     return header, None
+
+
+def quantity_of(name: str) -> str | None:
+    """The quantity that goes by a name, None if there is none."""
+    return _BY_ALIAS.get(plain(name))
 
 
 def is_unit(text: str) -> bool:
@@ -197,7 +204,7 @@ def understand(
     unknown = []
     for header, unit in headers.items():
         name, own = split_header(header)
-        quantity = _BY_ALIAS.get(plain(name)) or _BY_ALIAS.get(plain(header))
+        quantity = quantity_of(name) or quantity_of(header)
         if header in taken or _time_of(header) is not None:
             continue
         if quantity is None or quantity in mapping:

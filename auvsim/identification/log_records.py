@@ -47,25 +47,25 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
         there = np.isfinite(values)
         if there.sum() > 1:
             found[quantity] = Signal(times=log["dvl"]["time"][there], values=values[there])
-    places, where = _places(log, found["heading"], plan.sensors.usbl.transponder)
+    found_at, where, _ = places(log, found["heading"], plan.sensors.usbl.transponder)
     if len(where) > 1:
-        found |= {axis: Signal(times=where, values=places[:, k]) for k, axis in enumerate(("north", "east"))}
+        found |= {axis: Signal(times=where, values=found_at[:, k]) for k, axis in enumerate(("north", "east"))}
     excluded = _excluded(log)
     end = float(times[-1])
     out = sum(min(stop, end) - start for start, stop in excluded)
     notes = [f"{name}: {out:.0f} s left out: pitched, astern, or in the dock"] if excluded else []
-    deviations = _deviations(plan, places - usbl_dock(log).position[:2] if len(places) else places)
-    parts = [
+    deviations = _deviations(plan, found_at - usbl_dock(log).position[:2] if len(found_at) else found_at)
+    made = [
         Signals(
             name=label, kind=kind, signals=found, deviations=deviations,
             excluded=(*excluded, (-math.inf, start), (stop, math.inf)),
         )
-        for label, kind, start, stop in _parts(plan, name)
+        for label, kind, start, stop in parts(plan, name)
     ]  # fmt: skip
-    return parts, notes, plan.model
+    return made, notes, plan.model
 
 
-def _parts(plan: VehicleSettings, name: str) -> list[tuple[str, str, float, float]]:
+def parts(plan: VehicleSettings, name: str) -> list[tuple[str, str, float, float]]:
     """Label, kind, start and end [s] of each manoeuvre of a log."""
     if not isinstance(plan.mission, ManoeuvreMissionSettings):
         return [(name, "docking", -math.inf, math.inf)]
@@ -80,17 +80,20 @@ def _rudder(actuation: FinsAndShaft, channels: Array) -> Array:
     return np.array([actuation.effective(row).rudder for row in channels.tolist()])
 
 
-def _places(log: VehicleLog, heading: Signal, transponder: tuple[float, float, float]) -> tuple[Array, Array]:
-    """North and east (n, 2) [m] of the body's origin by fixes that arrived, in order of their stamps (n,) [s]."""
+def places(log: VehicleLog, heading: Signal, transponder: tuple[float, float, float]) -> tuple[Array, Array, Array]:
+    """North and east (n, 2) [m] of the body's origin by fixes that arrived, in order of their stamps (n,) [s].
+
+    The last is when each arrived (n,) [s].
+    """
     if "usbl" not in log:
-        return np.empty((0, 2)), np.empty(0)
+        return np.empty((0, 2)), np.empty(0), np.empty(0)
     arrived = np.isfinite(log["usbl"]["received"])
     stamps, first = np.unique(log["usbl"]["time"][arrived], return_index=True)
-    places = fixes(log)[arrived][first]
+    where = fixes(log)[arrived][first]
     psi = np.interp(stamps, heading.times, heading.values)
     forward, starboard, _ = transponder
     arm = (forward + 1j * starboard) * np.exp(1j * psi)
-    return places - np.column_stack([arm.real, arm.imag]), stamps
+    return where - np.column_stack([arm.real, arm.imag]), stamps, log["usbl"]["received"][arrived][first]
 
 
 def _deviations(plan: VehicleSettings, places: Array) -> dict[str, float]:

@@ -87,6 +87,7 @@ def is_trial_log(path: Path) -> bool:
 
 def _hash(path: Path) -> str:
     try:
-        return hashlib.sha256(path.read_bytes()).hexdigest()
+        files = sorted(p for p in path.iterdir() if p.is_file()) if path.is_dir() else [path]
+        return hashlib.sha256(b"".join(p.read_bytes() for p in files)).hexdigest()
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from None

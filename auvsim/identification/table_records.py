@@ -1,4 +1,4 @@
-"""A user's CSV or NetCDF file as signals: several rates, gaps, rows of NaN, several manoeuvres."""
+"""A user's CSV, NetCDF, MCAP or rosbag2 as signals: several rates, gaps, rows of NaN, several manoeuvres."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
@@ -10,12 +10,13 @@ from typing import NamedTuple
 import numpy as np
 
 from auvsim.base.errors import InputError
-from auvsim.identification import checks, cleaning, places, stamps
+from auvsim.identification import bag_columns, checks, cleaning, places, stamps
 from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, understand
 from auvsim.identification.records import MEASURED
 from auvsim.identification.signals import Signal, Signals, noise, steep
 from auvsim.identification.table_files import load
 from auvsim.identification.table_text import Column
+from auvsim.ros import bags
 from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
@@ -51,7 +52,7 @@ def signals(
     """The manoeuvres of a file as signals, and notes on what was assumed, dropped or not understood.
 
     Args:
-        path: CSV or NetCDF.
+        path: CSV, NetCDF, MCAP, or the folder of a rosbag2.
         mapping: What columns mean, where their names do not say it.
         shaft: Whether the shaft speed must be there; else its thrust counts as constant.
         inputs: Whether rudder and shaft speed must be there at all.
@@ -59,7 +60,7 @@ def signals(
     Raises:
         InputError: It cannot be read, lacks a column, or holds what cannot be right; the text says what would be.
     """
-    columns, read = load(path)
+    columns, mapping, read, described = _loaded(path, mapping)
     headers = {name: column.unit for name, column in columns.items()}
     meanings, unknown = understand(headers, mapping, str(path))
     by_quantity = {meaning.quantity: meaning for meaning in meanings}
@@ -70,7 +71,7 @@ def signals(
     }
     if not shaft and inputs and "shaft_speed" not in by_quantity:
         constants.setdefault("shaft_speed", 0.0)
-    _require(path, by_quantity.keys() | constants.keys(), list(columns), NEEDED if inputs else NEEDED[:1])
+    _require(path, by_quantity.keys() | constants.keys(), described, NEEDED if inputs else NEEDED[:1])
     time, said = stamps.seconds(columns, by_quantity["time"], path)
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
@@ -89,6 +90,14 @@ def signals(
     return found, notes
 
 
+def _loaded(path: Path, mapping: Mapping[str, ColumnSettings]) -> bag_columns.Chosen:
+    """The columns of any file, what a map says of them, notes, and what there is, for errors."""
+    if bags.is_bag(path):
+        return bag_columns.load(path, mapping)
+    columns, notes = load(path)
+    return bag_columns.Chosen(columns, dict(mapping), notes, list(columns))
+
+
 def _require(path: Path, there: set[str], columns: Sequence[str], needed: Sequence[str]) -> None:
     there = there | ({"rudder"} if "rudder_command" in there else set())
     missing = [quantity for quantity in needed if quantity not in there]
@@ -98,6 +107,11 @@ def _require(path: Path, there: set[str], columns: Sequence[str], needed: Sequen
         named = ", no column the ".join(quantity.replace("_", " ") for quantity in missing)
         examples = ", ".join(f"`{_EXAMPLES[quantity]}`" for quantity in missing)
         one = "name one" if len(missing) == 1 else "name them"
+        if bags.is_bag(path):
+            raise InputError(
+                f"{path}: no topic gives the {named.replace('column', 'topic')}; there are {', '.join(columns)}; say "
+                f"which with --columns, such as `{missing[-1].split()[0]}: {{column: /TOPIC.FIELD, unit: ...}}`"
+            )
         raise InputError(
             f"{path}: no column is the {named}; there are {', '.join(columns)}; "
             f"{one} {examples} or say which with --columns"
