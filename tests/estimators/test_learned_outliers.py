@@ -1,7 +1,6 @@
 """The share of outliers that a filter learns, and a start that allows for a first fix that is one."""
 
 import math
-import math
 from dataclasses import replace
 
 import numpy as np
