@@ -319,6 +319,30 @@ class Formation:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Modem:
+    """Charts what a modem gives a leader and its followers: packets that overlap, age of the leader's state, the bound.
+
+    ALOHA against TDMA, ranges by one-way against two-way travel time, over the number of followers: modem_NAME.png
+    and modem_NAME.csv. The bound is that of the scenario leader_follower with this modem.
+    """
+
+    name: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="NAME")]
+    """The modem, such as micromodem_fsk, micromodem_psk, s2c_r_18_34, seatrac_x150, atm_900."""
+    followers: Annotated[str, tyro.conf.arg(metavar="N|FROM..TO")] = "1..8"
+    """Numbers of followers."""
+    period: float = 10.0
+    """Time between two packets, or questions, of each [s]."""
+    distance: float = 500.0
+    """From the leader to each follower [m]."""
+    duration: float = 1800.0
+    """Of each run of the network [s]."""
+    seed: int = 0
+    """Seed of every random number."""
+    out: Path = Path("out")
+    """Folder of the chart."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Study:
     """Runs one of the studies behind the figures of the README; without a name lists them."""
 
@@ -356,6 +380,7 @@ Command = (
     | Metrics
     | Reproduce
     | Formation
+    | Modem
     | Study
     | Annotated[ShowVehicle, tyro.conf.subcommand("vehicle")]
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
@@ -559,6 +584,14 @@ def _run(arguments: list[str]) -> int:
         return reproduce.run(
             command.paper, quick=command.quick, seed=command.seed, out=command.out, jobs=command.jobs,
             truth=command.truth,
+        )  # fmt: skip
+
+    if isinstance(command, Modem):
+        from auvsim.cli import modem
+
+        return modem.run(
+            command.name, followers=command.followers, period=command.period, distance=command.distance,
+            duration=command.duration, seed=command.seed, out=command.out,
         )  # fmt: skip
 
     if isinstance(command, Formation):
