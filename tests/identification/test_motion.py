@@ -21,6 +21,7 @@ from auvsim.identification.motion.choice import Candidate, choose, seen, simples
 from auvsim.identification.motion.dimensions import Dimensions, coefficients
 from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
 from auvsim.identification.motion.rollout import persistence, roll
+from auvsim.identification.motion.uncertainty import halves, of_left_out
 from auvsim.identification.pipeline import Identification
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
@@ -448,4 +449,39 @@ def test_asymmetry_is_offered(found: MotionIdentification) -> None:
     assert {s.name for s in STRUCTURES} <= names
     assert any("asymmetry" in name for name in names)
     assert set(ASYMMETRY) <= set(LABELS)
-    assert choose is not None
+
+
+def test_two_records_tell_no_asymmetry_and_leave_each_other_out(paths: list[Path]) -> None:
+    """Constant errors of a record's sensors pass for asymmetry within it; bands are made of whole records too."""
+    motions = data.prepare(read(paths[:2]).records, coarsest=data.QUICK)
+    choice = choose(motions, STRUCTURES[:1], quick=True)
+    assert not any("asymmetry" in candidate.structure.name for candidate in choice.candidates)
+    whole = [out for _, out in choice.folds.splits[choice.folds.compared :]]
+    assert [[m.record.name for m in out] for out in whole] == [[m.record.name] for m in motions]
+    chosen = choice.chosen
+    assert all(len(c.shares) == choice.folds.compared for c in choice.candidates)  # the others do not choose
+    left_out = of_left_out(choice.folds, chosen.structure, chosen.step, (10.0,))
+    alone = [(rollouts, own) for rollouts, own in left_out if len(rollouts.begin) > 15]
+    assert len(alone) == 2
+
+
+def test_halves_go_as_far_as_both_converge() -> None:
+    """Two halves of a motion of the terms themselves agree by their deviations; a step that fails is not compared."""
+    true = {
+        "surge u|u|": -0.012,
+        "surge n|n|": 3e-6,
+        "sway v": -0.05,
+        "sway ur": -0.3,
+        "yaw r": -0.08,
+        "yaw uud": 0.012,
+    }
+    kept = structure("true", "u|u| n|n|", "v ur", "r uud")
+    motion = _simulated(true, 240.0)
+    found = fit.least_squares([motion], kept)
+    again = fit.segments([motion], found, fit.STEPS[1])
+    by_step = halves([motion], again, [again])
+    assert by_step.step == fit.STEPS[1]
+    assert by_step.scores.shape == (6,)
+    assert halves([motion], found).step == fit.STEPS[0]
+    astray = replace(again, values=again.values * np.nan)
+    assert halves([motion], again, [again, astray]).step == fit.STEPS[1]

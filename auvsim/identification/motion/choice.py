@@ -23,6 +23,9 @@ HORIZON = 60.0  # of the predictions that decide [s]
 FOLDS = 4
 KEPT = 2  # structures that go on to all steps
 EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
+# Records from which on whole ones are left out, and asymmetry may be chosen. Within a record it cannot be told from
+# constant errors of its sensors and from its current: it predicts other parts of the record well, and nothing else.
+RECORDS = 3
 SHORTEST = 40.0  # of a part of a record that is left out [s]
 FIRST_STEPS = STEPS[:2]
 
@@ -71,6 +74,10 @@ class Folds:
     def __init__(self, motions: Sequence[Motion], before: Mapping[str, float] | None = None) -> None:
         self.motions = list(motions)
         self.splits, self.said = _splits(self.motions)
+        self.compared = len(self.splits)  # the others are for bands alone
+        long = _long(self.motions)
+        if len(long) == 2:  # parts of a record share its kind and its errors: their predictions make bands too narrow
+            self.splits += [([m for m in self.motions if m is not out], [out]) for out in long]
         self.equations = [fits.regression(rest, before) for rest, _ in self.splits]
         self.whole = fits.regression(self.motions, before)
         self.horizon = min(HORIZON, horizons([m for _, out in self.splits for m in out], (HORIZON,))[-1])
@@ -98,7 +105,7 @@ class Folds:
     def candidate(self, structure: Structure, step: str) -> Candidate:
         """Fits without each part, and their predictions of it."""
         shares, converged = [], self.fit(structure, step, -1).converged
-        for fold, (_, out) in enumerate(self.splits):
+        for fold, (_, out) in enumerate(self.splits[: self.compared]):
             found = self.fit(structure, step, fold)
             converged &= found.converged
             rolled = [roll(found.vector, motion, (self.horizon,)).shares for motion in out]
@@ -141,7 +148,7 @@ def choose(
         calm = [seen(folds.whole, structure) for structure in structures if set(structure.terms) <= set(PLANAR)]
         found += [folds.candidate(structure, FIRST_STEPS[0]) for structure in calm]
     best = _ranked(found)[0].structure
-    more = [with_terms(best, ASYMMETRY)]
+    more = [with_terms(best, ASYMMETRY)] if len(_long(motions)) >= RECORDS else []
     if windy:
         more.append(replace(best, name=best.name.replace(" and wind", ""), terms=_without(best.terms, WIND)))
     for number, structure in enumerate(more):
@@ -216,10 +223,15 @@ def _ranked(found: Sequence[Candidate]) -> list[Candidate]:
     return sorted(found, key=lambda candidate: candidate.error)
 
 
+def _long(motions: Sequence[Motion]) -> list[Motion]:
+    """Those that can be left out whole."""
+    return [motion for motion in motions if motion.duration >= SHORTEST]
+
+
 def _splits(motions: Sequence[Motion]) -> tuple[list[tuple[list[Motion], list[Motion]]], str]:
     """What is fitted and what is left out, each time; and how that is said."""
-    long = [motion for motion in motions if motion.duration >= SHORTEST]
-    if len(long) >= 3:
+    long = _long(motions)
+    if len(long) >= RECORDS:
         groups = [long[k::FOLDS] for k in range(min(FOLDS, len(long)))]
         said = f"{len(groups)} groups of whole records left out in turn"
         return [([m for m in motions if all(m is not o for o in out)], out) for out in groups], said

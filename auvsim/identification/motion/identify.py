@@ -121,7 +121,8 @@ def identify_motion(
     choice = choose(motions, before=before, quick=quick, progress=lambda text, share: say(text, 0.05 + 0.7 * share))
     chosen, folds = choice.chosen, choice.folds
     say("disjoint halves", 0.8)
-    apart = halves(motions, chosen.structure, chosen.step)
+    before_it = [folds.fit(chosen.structure, step, -1) for step in STEPS[1 : STEPS.index(chosen.step) + 1]]
+    apart = halves(motions, choice.fit, before_it)
     widened = max(1.0, apart.rms**2)
     own = widened * fit.covariance(choice.fit)
     say("bands", 0.85)
@@ -199,6 +200,8 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
     said.append((chosen.converged, text if chosen.converged else f"{text}; it has not converged"))
     good = found.halves.rms <= APART
     text = f"fits to disjoint halves differ by {found.halves.rms:.2g} of their standard deviations, rms"
+    if found.halves.step != chosen.step:
+        text += f" (by {found.halves.step}, for by {chosen.step} they do not converge)"
     said.append((good, text if good else f"{text}: intervals and bands are widened by it"))
     weak = [
         term for term, value, deviation in zip(chosen.structure.terms, found.fit.values, found.deviations, strict=True)

@@ -17,7 +17,7 @@ from scipy.optimize import minimize
 from auvsim.identification.motion import fit as fits
 from auvsim.identification.motion.choice import Folds
 from auvsim.identification.motion.data import Motion, slices
-from auvsim.identification.motion.fit import STEPS, MotionFit
+from auvsim.identification.motion.fit import MotionFit
 from auvsim.identification.motion.rollout import Rollouts, roll
 from estimators.core.consistency import chi_square
 from estimators.core.types import Array
@@ -60,6 +60,7 @@ class Halves:
 
     scores: Array  # (k,) difference of the coefficients by its standard deviation
     rms: float
+    step: str  # to which both converge
 
 
 def of_left_out(
@@ -68,6 +69,8 @@ def of_left_out(
     """Predictions of each part left out by the fit without it, with that fit's covariance times `widened`."""
     found = []
     for fold, (_, out) in enumerate(folds.splits):
+        if not folds.fit(structure, step, fold).converged and fold >= folds.compared:
+            continue
         fit = folds.fit(structure, step, fold)
         own = widened * fits.covariance(fit)
         found += [(_spread_out(fit, motion, horizons), own) for motion in out]
@@ -198,8 +201,16 @@ def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
     )
 
 
-def halves(motions: Sequence[Motion], structure: Structure, step: str) -> Halves:
-    """Fits the structure to every other record, or every other part of few records, and to the rest."""
+def halves(motions: Sequence[Motion], like: MotionFit, steps: Sequence[MotionFit] = ()) -> Halves:
+    """Fits a structure to every other record, or every other part of few records, and to the rest.
+
+    Both go as far as both converge: what has run away says nothing of the intervals.
+
+    Args:
+        motions: All of them.
+        like: The fit to all of them, whose structure it is.
+        steps: Fits to all of them by the steps before it, and itself, from the second on; searches begin there.
+    """
     parts = list(motions)
     if len(parts) < 4:
         parts = []
@@ -207,13 +218,18 @@ def halves(motions: Sequence[Motion], structure: Structure, step: str) -> Halves
             count = max(1, min(4, int(motion.duration // _SHORTEST)))
             edges = np.linspace(0, len(motion.record.times), count + 1).astype(int)
             parts += [slices(motion, a, b) for a, b in pairwise(edges.tolist())]
-    both = []
-    for half in (parts[::2], parts[1::2]):
-        equations = fits.regression(half)
-        found = fits.least_squares(half, structure, equations)
-        for longer in STEPS[1 : STEPS.index(step) + 1]:
-            found = fits.segments(half, found, longer, equations)
-        both.append((found.values, fits.covariance(found)))
-    (first, one), (second, other) = both
-    scores = (first - second) / np.sqrt(np.maximum(np.diag(one + other), 1e-300))
-    return Halves(scores=scores, rms=float(np.sqrt(np.mean(scores**2))))
+    both = [parts[::2], parts[1::2]]
+    equations = [fits.regression(half) for half in both]
+    found = [fits.least_squares(half, like.structure, own) for half, own in zip(both, equations, strict=True)]
+    for whole in steps:
+        further = [
+            fits.segments(half, guess, whole.step, own, like=whole)
+            for half, guess, own in zip(both, found, equations, strict=True)
+        ]
+        if not all(fit.converged for fit in further):
+            break
+        found = further
+    first, second = found
+    spread = np.diag(fits.covariance(first) + fits.covariance(second))
+    scores = (first.values - second.values) / np.sqrt(np.maximum(spread, 1e-300))
+    return Halves(scores=scores, rms=float(np.sqrt(np.mean(scores**2))), step=first.step)
