@@ -9,7 +9,7 @@ from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.docking.aids import Aids
-from estimators.docking.models import Bias
+from estimators.docking.noise import Bias
 
 KINDS = {"gyro": GyroSettings, "dvl": DvlSettings, "range": RangeSettings}
 SPEED = 1.5  # at which a DVL's errors of scale and mounting are taken for biases [m/s]

@@ -25,7 +25,7 @@ from estimators.core.history import Node
 from estimators.core.outliers import Outliers
 from estimators.core.types import Gaussian
 from estimators.docking.estimator import AugmentedFilter, DockingEstimator, InteractingFilter, PaperFilter
-from estimators.docking.models import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
+from estimators.docking.noise import BIASES_OF_VEHICLE, PAPER_NOISE, REGULAR_NOISE, Bias, DockingNoise
 from estimators.docking.usbl import UsblFix, UsblModel
 from estimators.docking.vertical import VerticalFilter
 

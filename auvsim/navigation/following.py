@@ -27,7 +27,7 @@ from estimators.core.models.motion import constant_velocity, with_current, with_
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
 from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
-from estimators.docking.models import COMPASS
+from estimators.docking.sensors import COMPASS
 
 SPEED, TURNING, GYRO_BIAS = 2.0, 0.1, 1e-3  # not known at first: velocities [m/s], yaw rate, bias of a gyro [rad/s]
 

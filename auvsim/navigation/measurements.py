@@ -15,7 +15,7 @@ from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.types import Measurement
 from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
-from estimators.docking.models import COMPASS
+from estimators.docking.sensors import COMPASS
 
 FIX = "fix"  # kind of measurement
 

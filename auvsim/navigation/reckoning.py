@@ -24,7 +24,7 @@ from estimators.core.models.motion import constant_velocity, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
 from estimators.docking.aids import BOTTOM, GYRO, RANGE
-from estimators.docking.models import COMPASS
+from estimators.docking.sensors import COMPASS
 from estimators.docking.usbl import UsblFix, UsblModel
 
 BIASES = {"compass_bias": "rad", "gyro_bias": "rad/s"}

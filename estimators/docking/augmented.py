@@ -4,8 +4,10 @@ from typing import Literal, Unpack
 
 from estimators.core.filter import FilterState, ModelFilter
 from estimators.core.recovery import Readmission
-from estimators.docking.models import USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.models import ModelOptions, PlanarModels
+from estimators.docking.noise import DockingNoise
 from estimators.docking.recovery import FixRecovery
+from estimators.docking.sensors import USBL
 from estimators.planar.model import PlanarParameters
 
 __all__ = ["AugmentedFilter", "AugmentedState", "Transform"]

@@ -21,8 +21,7 @@ from estimators.core.loops import wrap
 from estimators.core.types import Array, Gaussian, Measurement, Outcome
 from estimators.docking.augmented import AugmentedFilter
 from estimators.docking.interacting import InteractingFilter
-from estimators.docking.models import (
-    COMPASS,
+from estimators.docking.noise import (
     INTERACTING_NOISE,
     PAPER_NOISE,
     REFERENCE_NOISE,
@@ -32,6 +31,7 @@ from estimators.docking.models import (
     DockingNoise,
 )
 from estimators.docking.paper import PaperFilter, estimate_current
+from estimators.docking.sensors import COMPASS
 from estimators.docking.usbl import UsblFix, UsblModel, horizontal_rotation, raw_fix
 
 __all__ = [

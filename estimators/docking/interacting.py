@@ -10,8 +10,10 @@ from estimators.core.history import Node
 from estimators.core.interacting import InteractingModelFilter, InteractingState
 from estimators.core.outliers import Outliers
 from estimators.core.types import Array, Gaussian, Measurement
-from estimators.docking.models import ROBUST_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.models import ModelOptions, PlanarModels
+from estimators.docking.noise import ROBUST_NOISE, DockingNoise
 from estimators.docking.recovery import FixRecovery
+from estimators.docking.sensors import USBL
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
 __all__ = ["InteractingFilter", "InteractingState"]

@@ -1,8 +1,7 @@
-"""Models that the docking filters share: noise, compass, position, and the start from a first fix."""
+"""Process and measurement models that the docking filters share, and the start from a first fix."""
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
 from typing import TypedDict
 
 import numpy as np
@@ -13,143 +12,9 @@ from estimators.core.loops import wrap
 from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
 from estimators.docking import range_start
 from estimators.docking.aids import RANGE, Aids
-from estimators.planar.model import BIASES, MAX_SUBSTEP, Biases, Integrator, PlanarParameters, PlanarProcess
-
-COMPASS, USBL = "compass", "usbl"  # kinds of measurement
-AIDED = ("gyro", "dvl_surge", "dvl_sway", "range_")  # how the errors of `aids` are called
-
-
-@dataclass(frozen=True, slots=True)
-class Bias:
-    """Prior of a constant error before it is estimated; units as in `planar_model.BIASES`."""
-
-    deviation: float  # standard deviation of its first value
-    density: float = 0.0  # of its random walk [its unit squared per second]
-
-
-@dataclass(frozen=True, kw_only=True, slots=True)
-class DockingNoise:
-    """Noise that a docking filter assumes; process noise as power spectral densities.
-
-    The defaults suit a planar model that was fitted to a vehicle: the process noise of its accelerations is ten times
-    that of the reference study, in which truth and filter shared the model.
-    """
-
-    position: float = 4e-4  # [m^2/s]
-    heading: float = 1e-6  # [rad^2/s]
-    surge: float = 1e-4  # [m^2/s^3]
-    sway: float = 1e-4  # [m^2/s^3]
-    yaw_rate: float = 1e-5  # [rad^2/s^3]
-    current: float = 3e-3  # random walk of the current [m^2/s^3]; 1e-5 suits a constant one and fails in turns
-    compass: float = math.radians(1.0)  # standard deviation of a sample [rad]
-    initial_surge: float = 0.1  # standard deviations at the first fix [m/s]
-    initial_sway: float = 0.05  # [m/s]
-    initial_yaw_rate: float = 0.05  # [rad/s]
-    initial_current: float = 0.5 / math.sqrt(2.0)  # each component [m/s]
-    biases: Mapping[str, Bias] = field(default_factory=dict)  # estimated besides, by the names of BIASES
-
-    def __post_init__(self) -> None:
-        unknown = [name for name in self.biases if name not in BIASES and not name.startswith(AIDED)]
-        if unknown:
-            raise ParameterError(f"no bias {', '.join(unknown)}; there are {', '.join((*BIASES, *AIDED))}")
-
-    @property
-    def bias_names(self) -> Biases:
-        """The biases in the state, in their order there: those of BIASES, then those of `aids`."""
-        first = [name for name in BIASES if name in self.biases]
-        return (*first, *(name for name in self.biases if name not in BIASES))
-
-    def densities(self) -> Array:
-        """Power spectral densities (8,) in the order of the state, then one of each bias."""
-        velocities = (self.surge, self.sway, self.yaw_rate)
-        biases = [self.biases[name].density for name in self.bias_names]
-        return np.array([self.position, self.position, self.heading, *velocities, self.current, self.current, *biases])
-
-
-# The reference study's truth (Qiu and Li 2019; calibrated to its Table 1), with a current that hardly changes.
-REFERENCE_NOISE = DockingNoise(position=4e-4, heading=1e-7, surge=1e-5, sway=1e-5, yaw_rate=1e-6, current=1e-8)
-# For eq. 11's filter, whose covariance does not know the error of the current: position noise covers for it.
-PAPER_NOISE = DockingNoise(position=2.5e-3, heading=1e-7, surge=1e-5, sway=1e-5, yaw_rate=1e-6, current=0.0)
-
-# Errors of the model that are fixed to the vehicle and not to the world, and so are no current: thrust or drag by some
-# tenth (3e-3 m/s^2 shift the REMUS-100's surge by 5 % at 0.8 m/s), and the compass.
-BIASES_OF_VEHICLE = {"surge": Bias(3e-3), "compass": Bias(0.02)}
-# For interacting modes, which bring the current's noise themselves: without and with these errors in the state.
-INTERACTING_NOISE = replace(REFERENCE_NOISE, current=0.0)
-ROBUST_NOISE = replace(INTERACTING_NOISE, biases=BIASES_OF_VEHICLE)
-REGULAR_NOISE = replace(PAPER_NOISE, position=1.0)  # the best for a filter that knows neither current nor delay
-
-
-class HeadingModel(MeasurementModel):
-    """A compass: y = psi, plus the state `bias` if given; a MeasurementModel of `n` states, psi the third."""
-
-    is_linear = is_angle = True
-
-    def __init__(self, n: int = 8, bias: int | None = None) -> None:
-        self._bias = bias
-        self._H = np.eye(1, n, 2)
-        if bias is not None:
-            self._H[0, bias] = 1.0
-
-    def evaluate(self, x: Array, measurement: Measurement | None = None) -> Array:
-        return x[2:3] if self._bias is None else x[2:3] + x[self._bias]
-
-    def jacobian(self, x: Array, measurement: Measurement | None = None) -> Array:
-        return self._H
-
-    def residual(self, value: Array, expected: Array) -> Array:
-        return np.array((wrap(float(value[0]) - float(expected[0])),))
-
-
-class PositionModel(MeasurementModel):
-    """The horizontal position (north, east) of a point (x, y) [m] of the hull, forward and starboard of its origin.
-
-    As the dock reports it: turned about the dock by the error of its compass, the state `dock_heading`, and taken later
-    than its stamp says by the state `clock`, to first order; None where that is no state. States have `n` elements.
-    """
-
-    def __init__(
-        self,
-        point: tuple[float, float] = (0.0, 0.0),
-        n: int = 8,
-        *,
-        dock_heading: int | None = None,
-        clock: int | None = None,
-    ) -> None:
-        self._x, self._y = point
-        self._H = np.eye(2, n)
-        self._dock_heading, self._clock = dock_heading, clock
-        self.is_linear = dock_heading is None and clock is None and point == (0.0, 0.0)
-
-    def evaluate(self, x: Array, measurement: Measurement | None = None) -> Array:
-        return self.shown(x)[0]
-
-    def jacobian(self, x: Array, measurement: Measurement | None = None) -> Array:
-        return self.shown(x)[1]
-
-    def shown(self, x: Array, measurement: Measurement | None = None) -> tuple[Array, Array]:
-        c, s = math.cos(x[2]), math.sin(x[2])
-        H = self._H.copy()
-        north, east = c * self._x - s * self._y, s * self._x + c * self._y
-        H[0, 2], H[1, 2] = -east, north
-        if self._clock is not None:
-            delay = x[self._clock]
-            ahead, abeam = c * x[3] - s * x[4], s * x[3] + c * x[4]  # velocity through the water, north and east
-            north += delay * (ahead + x[6])
-            east += delay * (abeam + x[7])
-            H[0, 2] -= delay * abeam
-            H[1, 2] += delay * ahead
-            H[:, 3:5] = delay * np.array(((c, -s), (s, c)))
-            H[0, 6] = H[1, 7] = delay
-            H[:, self._clock] = ahead + x[6], abeam + x[7]
-        value = np.array((x[0] + north, x[1] + east))
-        if self._dock_heading is not None:
-            # The dock's heading is measured too large, and with it the bearing of all that the dock measures.
-            c, s = math.cos(x[self._dock_heading]), math.sin(x[self._dock_heading])
-            R = np.array(((c, -s), (s, c)))
-            value, H = R @ value, R @ H
-            H[:, self._dock_heading] = -value[1], value[0]
-        return value, H
+from estimators.docking.noise import DockingNoise
+from estimators.docking.sensors import COMPASS, USBL, HeadingModel, PositionModel
+from estimators.planar.model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
 
 
 def steady_surge(parameters: PlanarParameters, shaft_speed: float) -> float:

@@ -12,7 +12,9 @@ from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
 from estimators.core.history import Input, Node
 from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdicts
-from estimators.docking.models import COMPASS, PAPER_NOISE, USBL, DockingNoise, ModelOptions, PlanarModels
+from estimators.docking.models import ModelOptions, PlanarModels
+from estimators.docking.noise import PAPER_NOISE, DockingNoise
+from estimators.docking.sensors import COMPASS, USBL
 from estimators.planar.model import PlanarParameters, PlanarProcess
 
 

@@ -9,7 +9,7 @@ from estimators.core import ekf
 from estimators.core.consistency import chi_square
 from estimators.core.recovery import AGREEMENT, MAX_AGE, Rejected
 from estimators.core.types import Gaussian, MeasurementModel
-from estimators.docking.models import DockingNoise
+from estimators.docking.noise import DockingNoise
 
 PLAUSIBLE = 0.999  # probability with which a change of the current is taken for one
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array, Measurement
-from estimators.docking.models import USBL
+from estimators.docking.sensors import USBL
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

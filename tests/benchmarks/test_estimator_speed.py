@@ -23,7 +23,8 @@ from estimators.core.models import sensors
 from estimators.core.models.motion import unicycle
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
-from estimators.docking.models import REFERENCE_NOISE, HeadingModel
+from estimators.docking.noise import REFERENCE_NOISE
+from estimators.docking.sensors import HeadingModel
 from estimators.planar.model import PRESTERO, PlanarProcess
 
 PROCESS, HEADING = PlanarProcess(PRESTERO, REFERENCE_NOISE.densities()), HeadingModel()

@@ -12,7 +12,9 @@ from estimators.core.types import Measurement
 from estimators.docking import range_start
 from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER, Aids
 from estimators.docking.augmented import AugmentedFilter
-from estimators.docking.models import COMPASS, Bias, DockingNoise, PlanarModels
+from estimators.docking.models import PlanarModels
+from estimators.docking.noise import Bias, DockingNoise
+from estimators.docking.sensors import COMPASS
 from estimators.planar.model import PRESTERO
 
 AIDS = Aids(gyro=True, dvl=True, ranges={"a": (0.6, -0.1), "b": (0.0, 0.0)})

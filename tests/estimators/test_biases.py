@@ -11,7 +11,8 @@ from estimators.core.errors import ParameterError
 from estimators.core.history import Node
 from estimators.core.types import Measurement
 from estimators.docking.estimator import REFERENCE_NOISE, AugmentedFilter, Bias, DockingEstimator, DockingNoise
-from estimators.docking.models import COMPASS, USBL, HeadingModel, PlanarModels, PositionModel
+from estimators.docking.models import PlanarModels
+from estimators.docking.sensors import COMPASS, USBL, HeadingModel, PositionModel
 from estimators.planar.model import BIASES, PRESTERO, PlanarProcess, step_function
 
 ALL = {"surge": Bias(3e-3), "compass": Bias(0.02), "dock_heading": Bias(0.01), "clock": Bias(0.2)}

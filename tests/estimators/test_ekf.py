@@ -10,7 +10,7 @@ from estimators.core.consistency import chi_square
 from estimators.core.ekf import correct, correct_angle, correct_linear, predict
 from estimators.core.errors import NotFiniteError, NotPositiveDefiniteError
 from estimators.core.types import Gaussian, Measurement, ProcessModel
-from estimators.docking.models import HeadingModel, PositionModel
+from estimators.docking.sensors import HeadingModel, PositionModel
 from estimators.planar.model import PRESTERO, PlanarProcess
 
 

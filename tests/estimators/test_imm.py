@@ -12,7 +12,7 @@ from estimators.core import ekf, imm, loops, outliers
 from estimators.core.errors import ParameterError
 from estimators.core.outliers import Outliers
 from estimators.core.types import Gaussian
-from estimators.docking.models import PositionModel
+from estimators.docking.sensors import PositionModel
 
 WEIGHTS = np.array([0.3, 0.7])
 TRANSITION = np.array([[0.9, 0.1], [0.2, 0.8]])

@@ -21,8 +21,8 @@ from estimators.docking.estimator import (
     PaperFilter,
     UsblFix,
 )
-from estimators.docking.models import COMPASS, USBL
 from estimators.docking.recovery import Rejected, agreeing
+from estimators.docking.sensors import COMPASS, USBL
 from estimators.planar.model import PRESTERO
 
 BIASES = {"surge": Bias(3e-3), "compass": Bias(0.02), "dock_heading": Bias(0.01), "clock": Bias(0.1)}

@@ -8,7 +8,7 @@ import pytest
 from estimators.core.consistency import chi_square
 from estimators.core.recovery import AGREEMENT, MAX_AGE, Rejected
 from estimators.core.types import Array, Gaussian, Measurement
-from estimators.docking.models import DockingNoise
+from estimators.docking.noise import DockingNoise
 from estimators.docking.recovery import agree, recover
 
 NOISE = DockingNoise(position=0.02, current=4e-3, initial_current=0.4)

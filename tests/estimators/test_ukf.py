@@ -10,7 +10,7 @@ from estimators.core import ekf, ukf
 from estimators.core.errors import NotPositiveDefiniteError, ParameterError
 from estimators.core.types import Gaussian, MeasurementModel
 from estimators.docking.augmented import AugmentedFilter
-from estimators.docking.models import HeadingModel, PositionModel
+from estimators.docking.sensors import HeadingModel, PositionModel
 from estimators.planar.model import PRESTERO, PlanarProcess
 
 

@@ -27,7 +27,7 @@ from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
 from estimators.core.types import Measurement
 from estimators.docking.estimator import UsblFix
-from estimators.docking.models import DockingNoise
+from estimators.docking.noise import DockingNoise
 
 DOCK = StructurePose(north=400.0, east=-300.0, depth=20.0, heading=0.7, pitch=0.05, roll=-0.04)
 MOUTH = DOCK.position[:2]

@@ -20,7 +20,7 @@ from auvsim.reproduce.paper1 import truths as paper1_truths
 from auvsim.reproduce.paper1.mujoco import NAVIGATORS, ROWS, bound, navigator
 from auvsim.reproduce.paper1.mujoco_runs import REACHED, SPEED, RunConditions, simulate, track
 from auvsim.reproduce.paper1.products import DOTS
-from estimators.docking.models import REFERENCE_NOISE
+from estimators.docking.noise import REFERENCE_NOISE
 
 SHORT, RUNS, KEYS = ("start", "approach"), 2, ("paper", "augmented", "imm_biases")
 NO_BIAS = {"dock_heading_bias_deg": 0.0, "dock_tilt_bias_deg": 0.0, "dock_depth_bias": 0.0}

@@ -17,7 +17,8 @@ from auvsim.reproduce.paper1.runs import TICK
 from auvsim.reproduce.paper1.study import AFTER, FILTERS, Result, Row, Score
 from auvsim.reproduce.paper1.yardsticks import along, mean_square
 from estimators.docking.estimator import PAPER_NOISE, PaperFilter
-from estimators.docking.models import DockingNoise, PlanarModels
+from estimators.docking.models import PlanarModels
+from estimators.docking.noise import DockingNoise
 
 # Settled rows are many short runs, because what errs there most, the compasses, errs alike throughout a run.
 SETTLED, STEADY, TURN = RunConditions(duration=400.0), RunConditions(), RunConditions(turn=(120.0, 130.0))

@@ -12,7 +12,8 @@ from estimators.core import batch
 from estimators.core.bounds import PosteriorBound
 from estimators.core.types import Array
 from estimators.docking.estimator import REFERENCE_NOISE, DockingEstimator
-from estimators.docking.models import COMPASS, USBL, PlanarModels
+from estimators.docking.models import PlanarModels
+from estimators.docking.sensors import COMPASS, USBL
 from estimators.planar.model import PRESTERO
 
 # When the batch estimate is made [s]. Errors of the two estimates are nearly the same, so that the ratio needs few of
