@@ -113,7 +113,8 @@ def _copies(log: VehicleLog, plan: Scenario) -> dict[int, float]:
     if acoustics.duplicate_probability == 0.0:
         return {}
     attributes = log.log.attributes
-    noise = Noise(stream(int(attributes["seed"]), int(attributes["trial"]), f"{log.name}/acoustics"))
+    seed, trial = int(attributes["seed"]), int(attributes["trial"])
+    noise = Noise(stream(seed, trial, f"{log.name}/acoustics", plan.random.steps))
     later = {}
     for sequence in log["sensors/usbl"]["sequence"].tolist():
         *_, twice, gap = noise.uniforms(5)

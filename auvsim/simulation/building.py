@@ -20,7 +20,8 @@ def current(scenario: Scenario, seed: int, trial: int = 0) -> CurrentField:
     names = [*scenario.vehicles]
     source = f"{names[0]}/current" if len(names) == 1 else "water/current"
     with at_key("water.current"):
-        return build_current(scenario.water.current, stream(seed, trial, source), scenario.duration + 1.0)
+        generator = stream(seed, trial, source, scenario.random.steps)
+        return build_current(scenario.water.current, generator, scenario.duration + 1.0)
 
 
 def check_steps(scenario: Scenario) -> None:

@@ -134,8 +134,11 @@ class Simulation:
     ) -> None:
         self.scenario, rates = scenario, scenario.rates
 
+        def drawn(source: str) -> Generator:
+            return stream(seed, trial, source, scenario.random.steps)
+
         def noise(vehicle: str) -> Callable[[str], Generator]:
-            return lambda source: stream(seed, trial, f"{vehicle}/{source}")
+            return lambda source: drawn(f"{vehicle}/{source}")
 
         self.world = world or build_world(scenario, current(scenario, seed, trial))
         self._places = {
@@ -152,7 +155,7 @@ class Simulation:
         links = {
             usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
         }
-        self.network = Network(links, self._usbl, self._modems(lambda source: stream(seed, trial, source)))
+        self.network = Network(links, self._usbl, self._modems(drawn))
         self._fates: dict[tuple[str, str], str] = {}  # the last one, by sender and receiver
         self._physics_ticks = round(rates.physics / rates.control)
         self._log_ticks = max(1, round(rates.control / rates.log))

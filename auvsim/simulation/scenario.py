@@ -13,6 +13,7 @@ from auvsim.acoustics.modem import ModemSettings
 from auvsim.acoustics.modems import SoundSettings
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
+from auvsim.base.randomness import LARGEST, Walk
 from auvsim.base.settings import Settings
 from auvsim.control.registry import ControlSettings
 from auvsim.control.torpedo import AutopilotSettings
@@ -138,11 +139,33 @@ class NetworkSettings(SoundSettings):
     acoustics: AcousticSettings = AcousticSettings()
 
 
+class WalkStep(Settings):
+    """One step of a walk: the normals of another trial, mixed in at an angle."""
+
+    trial: int = Field(ge=0, lt=LARGEST, description="trial of the run's seed whose noises are mixed in")
+    angle_deg: float = Field(description="x becomes x cos + n sin of it: 0 leaves all as it is, 90 is the other [deg]")
+
+
+class RandomSettings(Settings):
+    """What the run's noises are made of, beside seed and trial."""
+
+    walk: tuple[WalkStep, ...] | None = Field(
+        default=None,
+        description="steps from the trial's noises to near ones, as `auvsim stress` takes them; none: plain",
+    )
+
+    @property
+    def steps(self) -> Walk | None:
+        """Of `base.randomness.stream`."""
+        return None if self.walk is None else [(step.trial, math.radians(step.angle_deg)) for step in self.walk]
+
+
 class Scenario(Settings):
     """One run, with every number definite."""
 
     duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
+    random: RandomSettings = RandomSettings()
     datum: DatumSettings = DatumSettings()
     physics: PhysicsSettings = PhysicsSettings()
     water: WaterSettings = WaterSettings()

@@ -21,7 +21,15 @@ from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import EstimatorSettings, RobustSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import WorldSettings
-from auvsim.simulation.scenario import DatumSettings, Rates, Scenario, Start, StructureSettings, validated
+from auvsim.simulation.scenario import (
+    DatumSettings,
+    RandomSettings,
+    Rates,
+    Scenario,
+    Start,
+    StructureSettings,
+    validated,
+)
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.vehicles import library
 from auvsim.water.settings import CurrentSettings, UniformSettings
@@ -51,6 +59,7 @@ class ShortScenario(Settings):
 
     duration: float = Field(default=1200.0, gt=0.0, le=1e6, description="time limit of the run [s]")
     rates: Rates = Rates()
+    random: RandomSettings = RandomSettings()
     datum: DatumSettings = DatumSettings()
     vehicle: LoneVehicle = LoneVehicle()
     dock: StructureSettings | None = Field(default=StructureSettings(), description="The dock.")
@@ -134,6 +143,7 @@ def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
     return {
         "duration": short.duration,
         "rates": short.rates,
+        "random": short.random,
         "datum": short.datum,
         "physics": {"integrator": short.world.integrator},
         "water": {

@@ -6,12 +6,14 @@ from auvsim.water.boundary_layer import BoundaryLayer
 from auvsim.water.field import CurrentField, ProgressListener, Water, horizontal, listeners
 from auvsim.water.grid import Grid
 from auvsim.water.gust import GUST_CORRELATION, Gust
+from auvsim.water.knots import Knots
 from auvsim.water.settings import (
     ApproachTurnSettings,
     BoundaryLayerSettings,
     CurrentSettings,
     GridSettings,
     GustSettings,
+    KnotsSettings,
     NoneSettings,
     ShearSettings,
     SumSettings,
@@ -34,6 +36,7 @@ __all__ = [
     "CurrentField",
     "Grid",
     "Gust",
+    "Knots",
     "ProgressListener",
     "Shear",
     "Sum",
@@ -65,6 +68,8 @@ def build_current(settings: CurrentSettings, generator: Generator, duration: flo
             return Turning(settings)
         case ApproachTurnSettings():
             return ApproachTurn(settings, generator)
+        case KnotsSettings():
+            return Knots(settings)
         case ShearSettings():
             return Shear(settings)
         case GustSettings():

@@ -55,6 +55,30 @@ class ApproachTurnSettings(Settings):
     duration: float = Field(default=10.0, gt=0.0, description="time that a turn takes [s]")
 
 
+class Knot(Settings):
+    """A uniform current at one time."""
+
+    time: float = Field(ge=0.0, description="time [s]")
+    north: float = Field(default=0.0, description="velocity north then [m/s]")
+    east: float = Field(default=0.0, description="velocity east then [m/s]")
+
+
+class KnotsSettings(Settings):
+    """A uniform current given at some times: linear between them, constant before the first and after the last."""
+
+    kind: Literal["knots"] = "knots"
+    knots: tuple[Knot, ...] = Field(
+        default=(Knot(time=0.0), Knot(time=300.0, north=0.3)), min_length=1, description="currents at increasing times"
+    )
+
+    @model_validator(mode="after")
+    def _ordered(self) -> "KnotsSettings":
+        times = [knot.time for knot in self.knots]
+        if any(after <= before for before, after in pairwise(times)):
+            raise ValueError(f"the times of the knots are {times}, they must increase")
+        return self
+
+
 class ShearPoint(Settings):
     """The current at one depth."""
 
@@ -188,6 +212,7 @@ CurrentSettings = Annotated[
     | UniformSettings
     | TurningSettings
     | ApproachTurnSettings
+    | KnotsSettings
     | ShearSettings
     | GustSettings
     | BoundaryLayerSettings

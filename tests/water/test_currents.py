@@ -24,6 +24,14 @@ POINTS = [
 ]
 SMOOTH = {"kind": "shear", "points": POINTS}
 LINEAR = {"kind": "shear", "profile": "linear", "points": POINTS[:2]}
+KNOTS = {
+    "kind": "knots",
+    "knots": [
+        {"time": 20.0, "north": 0.1, "east": -0.2},
+        {"time": 60.0, "north": 0.5, "east": 0.3},
+        {"time": 70.0, "north": -0.1},
+    ],
+}
 GUST = {"kind": "gust", "intensity": 0.2, "correlation_time": 12.0}
 SUM = {"kind": "sum", "terms": [UNIFORM, TURNING, {"kind": "sum", "terms": [SMOOTH, GUST]}]}
 FIELDS = {
@@ -33,6 +41,7 @@ FIELDS = {
     "smooth": SMOOTH,
     "linear": LINEAR,
     "gust": GUST,
+    "knots": KNOTS,
     "sum": SUM,
 }
 
@@ -272,3 +281,17 @@ def test_only_currents_that_follow_the_approach_listen_to_it():
     found = listeners(nested)
     assert [type(part).__name__ for part in found] == ["ApproachTurn", "ApproachTurn"]
     assert found[0] is not found[1]
+
+
+def test_knots_are_joined_by_straight_lines_and_held_beyond():
+    current, here = field(KNOTS), np.zeros(3)
+    for time, north, east in (
+        (0.0, 0.1, -0.2),
+        (20.0, 0.1, -0.2),
+        (30.0, 0.2, -0.075),
+        (65.0, 0.2, 0.15),
+        (99.0, -0.1, 0.0),
+    ):
+        assert current.evaluate(time, here).velocity == pytest.approx([north, east, 0.0], abs=1e-15)
+    with pytest.raises(ValidationError, match="they must increase"):
+        field({"kind": "knots", "knots": [{"time": 5.0}, {"time": 5.0}]})
