@@ -124,23 +124,28 @@ def _run_blocks(folder: Folder, engine: Engine, tally: "_Tally") -> int | None:
 
 
 def _finished(plan: Plan, engine: Engine, places: Iterable[tuple[str, int]]) -> Iterator[tuple[Record, bytes | None]]:
-    """Runs trials and gives the record and log of each.
+    """Runs trials and gives the record and log of each."""
+    keys, tasks = (*plan.drawn, *plan.compared), (task(plan, *place) for place in places)
+    for each, result, retries in results(engine, tasks, plan.settings.timeout):
+        yield trials.record(each, result, keys, retries), result.log
+
+
+def results(engine: Engine, tasks: Iterable[Task], timeout: float) -> Iterator[tuple[Task, Result, int]]:
+    """Runs trials; gives each with its result, and how often it ran again, in the order in which they end.
 
     A trial whose process died or hung runs a second time: nobody knows yet whether it was its own doing, a hungry
     neighbour's or the machine's. Those that died do so alone. What happens again is charged to it.
     """
-    keys, timeout = (*plan.drawn, *plan.compared), plan.settings.timeout
     hung: list[Task] = []
     died: list[Task] = []
-    for each, outcome in engine.run(trials.run, (task(plan, *place) for place in places), timeout=timeout):
+    for each, outcome in engine.run(trials.run, tasks, timeout=timeout):
         if isinstance(outcome, Death):
             (hung if outcome.hung else died).append(each)
         else:
-            yield trials.record(each, outcome, keys, 0), outcome.log
+            yield each, outcome, 0
     for again in ([hung] if hung else []) + [[each] for each in died]:
         for each, outcome in engine.run(trials.run, again, timeout=timeout):
-            result = charged(outcome) if isinstance(outcome, Death) else outcome
-            yield trials.record(each, result, keys, 1), result.log
+            yield each, charged(outcome) if isinstance(outcome, Death) else outcome, 1
 
 
 def charged(death: Death) -> Result:

@@ -53,16 +53,16 @@ class Folder:
         """
         variant, trial = record["variant"], record["trial"]
         if log is not None:
-            self._write(self.log_path(variant, trial), log)
-        self._write(self.record_path(variant, trial), _json(record))
+            write(self.log_path(variant, trial), log)
+        write(self.record_path(variant, trial), as_json(record))
 
     def save_plan(self) -> None:
         """Writes plan.yaml, by which, with campaign.json, the folder becomes a campaign's; may raise as `save`."""
-        self._write(self.path / PLAN, self.plan.to_yaml().encode())
+        write(self.path / PLAN, self.plan.to_yaml().encode())
 
     def save_state(self) -> None:
         """Writes campaign.json; may raise as `save`."""
-        self._write(self.path / STATE, _json(self.state))
+        write(self.path / STATE, as_json(self.state))
 
     def read(self, variant: str, trial: int) -> Record | None:
         """A finished trial; None if it is not, or if a power cut left less than the whole file."""
@@ -82,18 +82,24 @@ class Folder:
                 if record is not None:
                     yield record
 
-    def _write(self, path: Path, content: bytes) -> None:
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            with whole(path) as partial, open(partial, "wb") as stream:
-                stream.write(content)
-                stream.flush()
-                os.fsync(stream.fileno())
-        except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise InputError(
-                f"{path}: cannot be written: {reason}; what is finished is kept, the same command goes on from there"
-            ) from None
+
+def write(path: Path, content: bytes) -> None:
+    """Writes a file of a campaign, whole and synced.
+
+    Raises:
+        InputError: If there is no room, or the folder cannot be written to.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with whole(path) as partial, open(partial, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(
+            f"{path}: cannot be written: {reason}; what is finished is kept, the same command goes on from there"
+        ) from None
 
 
 def open_folder(path: Path) -> Folder:
@@ -136,16 +142,20 @@ def claimed(path: Path, plan: Plan, versions: Mapping[str, str]) -> Iterator[Fol
     folder = Folder(path, plan, _state(path) if old else {})
     if old:
         _check_same(path, plans.load(str(path)), plan)
-        _check_versions(path, folder.state.get("versions", versions), versions)
-    with _locked(path):
+        check_versions(path, folder.state.get("versions", versions), versions)
+    with locked(path):
         for partial in [*path.glob(".*.partial*"), *path.glob("*/**/.*.partial*")]:  # of a run that was killed
             partial.unlink(missing_ok=True)
         yield folder
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Makes the folder and keeps other campaigns out of it; a new one that stays empty goes again."""
+def locked(path: Path) -> Iterator[None]:
+    """Makes the folder and keeps other processes out of it; a new one that stays empty goes again.
+
+    Raises:
+        InputError: If another process runs in it, or it cannot be written to.
+    """
     new = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
         path.mkdir(parents=True, exist_ok=True)
@@ -174,7 +184,8 @@ def _check_same(path: Path, old: Plan, new: Plan) -> None:
         raise InputError(f"{path}: holds another plan ({key} differs); give another folder with --out")
 
 
-def _check_versions(path: Path, old: Mapping[str, str], new: Mapping[str, str]) -> None:
+def check_versions(path: Path, old: Mapping[str, str], new: Mapping[str, str]) -> None:
+    """Refuses to go on in a folder of results of other versions (InputError)."""
     for package, version in new.items():
         if old.get(package) != version:
             text = f"was begun with {package} {old.get(package)}, and this is {version}"
@@ -197,5 +208,6 @@ def _state(path: Path) -> dict[str, Any]:
         return {}
 
 
-def _json(values: Mapping) -> bytes:
+def as_json(values: Mapping) -> bytes:
+    """Values as the text of a file."""
     return (json.dumps(values, indent=1, allow_nan=False) + "\n").encode()

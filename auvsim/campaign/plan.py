@@ -22,6 +22,7 @@ from auvsim.vehicles import library
 
 SHIPPED = Path(auvsim.__file__).parent / "plans"
 ALONE = "all"  # name of the only variant of a plan that names none
+WITHOUT_EFFECT = {"name", "trials", "stop", "success", "timeout", "keep", "stress"}  # on what a trial comes to
 CHECKED = 100  # first trials of each variant that are drawn and checked before anything runs
 
 
@@ -65,6 +66,7 @@ class PlanSettings(Settings):
     )
     timeout: float = Field(default=600.0, gt=0.0, description="after which a trial counts as hung, wall-clock time [s]")
     keep: Literal["none", "failures", "all"] = Field(default="none", description="of which trials the logs are kept")
+    stress: dict[str, Any] | None = Field(default=None, description="what `auvsim stress` looks for; else of no effect")
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,7 @@ class Plan:
 
     def identity(self) -> dict:
         """What makes its trials what they are; a campaign goes on only with a plan of the same."""
-        values = self.settings.model_dump(mode="json", exclude={"name", "trials", "stop", "success", "timeout", "keep"})
+        values = self.settings.model_dump(mode="json", exclude=WITHOUT_EFFECT)
         return values | ({"strata": self.strata} if self.settings.sampling == "latin_hypercube" else {})
 
     def to_yaml(self) -> str:
