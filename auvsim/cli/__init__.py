@@ -207,6 +207,29 @@ class Campaign:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Stress:
+    """Looks for where a scenario breaks: edges and maps of success, rare events, the worst current.
+
+    The plan is a campaign's with the section `stress`, which says what is varied and what is looked for. Each trial is
+    kept; the same command, also with more budget or another section, goes on. Writes report.html, pictures, and
+    findings/: scenarios that `auvsim dock` runs again bit for bit.
+    """
+
+    plan: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="PLAN.yaml|NAME|FOLDER")]
+    """The plan, the name of a shipped one (docking_envelope), or the folder of a stress test."""
+    out: Path | None = None
+    """Folder of the stress test; by default out/ and the plan's name."""
+    budget: int | None = None
+    """Most trials; by default as many as the plan takes."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+    engine: Literal["local", "dask"] = "local"
+    """What runs them: processes of this machine, or Dask (pip install 'auvsim[cluster]')."""
+    scheduler: Annotated[str | None, tyro.conf.arg(metavar="tcp://HOST:PORT")] = None
+    """Scheduler of a Dask cluster; by default Dask starts one on this machine."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class Report:
     """Writes the tables and the report of a campaign again, also of one that is not finished."""
 
@@ -370,6 +393,7 @@ Command = (
     | Run
     | Bound
     | Campaign
+    | Stress
     | Report
     | Manoeuvre
     | Identify
@@ -534,6 +558,12 @@ def _run(arguments: list[str]) -> int:
                 return campaign.run(command.plan, out=command.out, jobs=command.jobs, **engine)
         which = {"trial": command.trial, "variant": command.variant}
         return campaign.replay(command.plan, **which, out=command.out, video=command.video)
+
+    if isinstance(command, Stress):
+        from auvsim.cli import stress
+
+        engine = {"engine": command.engine, "scheduler": command.scheduler}
+        return stress.run(command.plan, out=command.out, budget=command.budget, jobs=command.jobs, **engine)
 
     if isinstance(command, Manoeuvre):
         from auvsim.cli import manoeuvre, options

@@ -5,7 +5,9 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-VOID = frozenset({"br", "col", "input", "link", "meta", "circle", "line", "path", "polyline", "rect"})  # no children
+VOID = frozenset(
+    {"br", "col", "img", "input", "link", "meta", "circle", "line", "path", "polyline", "rect"}
+)  # no children
 
 
 class Markup(str):
