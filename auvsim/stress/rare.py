@@ -3,14 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from auvsim.analysis.statistics import wilson
 from auvsim.base.frames import Array
 from auvsim.stress.bench import Outcome
-from auvsim.stress.plan import Point, Steps
+from auvsim.stress.plan import Steps
 from auvsim.stress.settings import RareSettings
 
 ACCEPTED = 0.44  # share of steps at which the angle stays as it is (Papaioannou et al. 2015)
@@ -20,7 +20,7 @@ NORMAL_95 = 1.959963984540054
 class Places(Protocol):
     """What gives the trial at a place that was walked to; `StressPlan` is one."""
 
-    def point(self, levels: dict[str, float], trial: int, walk: Steps | None = None) -> Point:
+    def point(self, levels: dict[str, float], trial: int, walk: Steps | None = None) -> Any:
         """The trial."""
         ...
 
@@ -104,7 +104,7 @@ class Subset:
         """All trials of finished levels, each once."""
         return list({(s.trial, s.walk): s for level in self.levels for s in level.samples}.values())
 
-    def wanted(self) -> list[Point]:
+    def wanted(self) -> list[Any]:
         """The next trials: all of the first level, then a step of every chain."""
         return [self._places.point({}, trial, walk) for trial, walk in self._proposed]
 

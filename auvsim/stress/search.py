@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Protocol
+from typing import Any, Protocol
 
 from auvsim.stress.bench import Bench, BudgetSpentError, Outcome
 from auvsim.stress.envelope import EnvelopeMap
@@ -63,7 +63,7 @@ class Searches:
             self.spent = True
 
 
-def advance(searches: Sequence[Search], evaluate: Callable[[Sequence[Point]], list[Outcome]]) -> None:
+def advance(searches: Sequence[Search], evaluate: Callable[[Sequence[Any]], Sequence[Any]]) -> None:
     """Advances searches side by side until all are done."""
     while wanted := [(search, points) for search in searches if (points := search.wanted())]:
         outcomes = evaluate([point for _, points in wanted for point in points])

@@ -3,14 +3,13 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from auvsim.base.frames import Array
 from auvsim.base.randomness import stream
 from auvsim.stress.bench import Outcome
-from auvsim.stress.plan import Point
 from auvsim.stress.settings import WorstSettings
 
 KEPT = 0.3  # share of the last mean and spread that stays
@@ -21,7 +20,7 @@ FIRST = 0.7  # the same at the beginning
 class Histories(Protocol):
     """What gives the trial in a current; `StressPlan` is one."""
 
-    def in_current(self, trial: int, knots: Sequence[dict[str, float]]) -> Point:
+    def in_current(self, trial: int, knots: Sequence[dict[str, float]]) -> Any:
         """The trial."""
         ...
 
@@ -68,7 +67,7 @@ class Worst:
         """The worst history."""
         return max((h for tried in self.iterations for h in tried), key=lambda h: h.badness)
 
-    def wanted(self) -> list[Point]:
+    def wanted(self) -> list[Any]:
         """The trials of all histories of an iteration."""
         if self.done:
             return []
