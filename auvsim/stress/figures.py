@@ -83,8 +83,8 @@ def chart(found: EnvelopeMap, searches: Searches) -> Figure:
             low, high = cell.interval
             text = f"{100 * cell.rate:.0f}\n{100 * low:.0f}-{100 * high:.0f}"
             axes.text(x + w / 2, y + h / 2, text, ha="center", va="center", fontsize=5.0 + 14.0 * cell.size)
-    axes.set_xlim(sorted(across.range))
-    axes.set_ylim(sorted(upward.range))
+    axes.set_xlim(min(across.range), max(across.range))
+    axes.set_ylim(min(upward.range), max(upward.range))
     axes.set_xlabel(found.names[0])
     axes.set_ylabel(found.names[1])
     from matplotlib.cm import ScalarMappable

@@ -50,7 +50,7 @@ class Searches:
     @property
     def groups(self) -> list[list[Search]]:
         """Searches that go on side by side, one group after the other."""
-        last = [[search] for search in (self.rare, self.worst) if search is not None]
+        last: list[list[Search]] = [[search] for search in (self.rare, self.worst) if search is not None]
         return [list(self.ladders), list(self.maps), *last]
 
     def run(self, bench: Bench) -> None:

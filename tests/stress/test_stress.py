@@ -132,7 +132,7 @@ class Toy:
         self._seed = seed
 
     def point(self, levels, trial, walk=None):
-        steps = [(other, math.radians(angle)) for other, angle in walk]
+        steps = [(other, math.radians(angle)) for other, angle in walk or ()]
         return float(stream(self._seed, trial, "toy", steps).standard_normal(10).sum()) / math.sqrt(10.0)
 
 
@@ -148,7 +148,7 @@ def test_subset_simulation_finds_a_closed_form_and_its_interval_holds_it():
         found = [probability(seed, above).probability() for seed in range(runs)]
         mean = np.mean([p.value for p in found])
         spread = np.std([p.value for p in found]) / math.sqrt(runs)
-        assert mean == pytest.approx(exact, abs=4.0 * spread)  # unbiased but for terms of 1/N: 4 sd of the mean
+        assert mean == pytest.approx(exact, abs=4.0 * float(spread))  # unbiased but for terms of 1/N: 4 sd of the mean
         # A 95 % interval that leaves out how levels hang together; below these shares it would be wrong, not short.
         assert np.mean([p.low <= exact <= p.high for p in found]) >= floor
 
