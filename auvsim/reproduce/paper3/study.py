@@ -112,7 +112,9 @@ def _rows() -> dict[str, Row]:
         for name, loss, delay in (("", 0.0, 15.0), ("_60%", 0.6, 15.0), ("_late", 0.0, 60.0)):
             conditions = Conditions(scene=scene, mode="sensor", carried=True, loss=loss, delay=delay)
             title = f"MuJoCo, fine noise, {scene}, {conditions.loss:.0%} lost, packets {conditions.delay:g} s late"
-            rows[f"{MUJOCO}{scene}{name}"] = Row(title=title, conditions=conditions, methods=MAIN, quick_runs=2)
+            rows[f"{MUJOCO}{scene}{name}"] = Row(
+                title=title, conditions=conditions, methods=MAIN, runs=40, quick_runs=2
+            )
     return rows
 
 

@@ -14,6 +14,7 @@ from auvsim.reproduce.paper3.follow import SAMPLE, Track
 from auvsim.reproduce.paper3.truths import STEP, Run
 from estimators.core import batch
 from estimators.core.consistency import normalised_square
+from estimators.core.errors import NotFiniteError
 from estimators.core.history import Node
 from estimators.core.particle import ParticleFilter, ParticleState, drawn
 from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
@@ -84,13 +85,19 @@ class LeaderRange(MeasurementModel):
 
 
 def most_probable(run: Run) -> Track:
-    """The track of the whole trajectory given all ranges (core.batch)."""
+    """The track of the whole trajectory given all ranges (core.batch).
+
+    Where the search does not converge, which happens at the paper's noise, the track is that of the extended Kalman
+    filter from which it starts.
+    """
     nodes = _nodes(run)
-    guess = _followed(run)
-    found = batch.solve(nodes, _prior(run), Pair(run), {RANGE: LeaderRange()}, guess, iterations=60, tolerance=1e-3)
-    picked = range(round(SAMPLE / STEP), len(nodes), round(SAMPLE / STEP))
-    covariances = [found.covariance(k)[:2, :2] for k in picked]
-    return _track(run, found.means[list(picked)], np.array(covariances))
+    means, covariances = _followed(run)
+    picked = np.arange(round(SAMPLE / STEP), len(nodes), round(SAMPLE / STEP))
+    try:
+        found = batch.solve(nodes, _prior(run), Pair(run), {RANGE: LeaderRange()}, means, iterations=40, tolerance=1e-3)
+    except NotFiniteError:
+        return _track(run, means[picked], covariances[picked])
+    return _track(run, found.means[picked], np.array([found.covariance(k)[:2, :2] for k in picked.tolist()]))
 
 
 def particle(run: Run) -> Track:
@@ -134,10 +141,11 @@ def _nodes(run: Run) -> list[Node]:
     return nodes
 
 
-def _followed(run: Run) -> Array:
-    """States (k + 1, 6) to start the search from: those of an extended Kalman filter over the nodes."""
+def _followed(run: Run) -> tuple[Array, Array]:
+    """States (k + 1, 6) of an extended Kalman filter over the nodes, and covariances (k + 1, 2, 2) of the place."""
     nodes, process, model, prior = _nodes(run), Pair(run), LeaderRange(), _prior(run)
-    x, P, found = prior.mean.copy(), prior.covariance.copy(), [prior.mean]
+    x, P = prior.mean.copy(), prior.covariance.copy()
+    found, spread = [x], [P[:2, :2]]
     for before, node in pairwise(nodes):
         x, P, _ = process.propagate(x, P, before.input, node.time - before.time)
         for m in node.measurements:
@@ -145,7 +153,8 @@ def _followed(run: Run) -> Array:
             gain = P @ H.T / (H @ P @ H.T + m.covariance)
             x, P = x + gain[:, 0] * (m.value - model.evaluate(x, m)), P - gain @ H @ P
         found.append(x)
-    return np.array(found)
+        spread.append(P[:2, :2])
+    return np.array(found), np.array(spread)
 
 
 def _track(run: Run, means: Array, covariances: Array) -> Track:
