@@ -131,7 +131,7 @@ class SeaTrials:
         return self.fit.acceleration_rms / self.fit.acceleration_scale
 
 
-class _Pilot:
+class Pilot:
     """The vehicle's autopilot, which sees the truth."""
 
     def __init__(self, model: str, actuation: Any) -> None:
@@ -173,7 +173,7 @@ def run(model: str, progress: Callable[[float], None] = lambda _: None) -> SeaTr
 
     def steered(setpoints: Callable[[float, Truth], Setpoints], seconds: float) -> list[Truth]:
         """On a straight course until all is steady, then as the setpoints say."""
-        pilot = _Pilot(model, vehicle.actuation)
+        pilot = Pilot(model, vehicle.actuation)
         bench.sail(lambda _, truth: pilot.demand(truth, hold, shaft), 40.0, start=ahead, speed=cruise)
         return bench.sail(lambda time, truth: pilot.demand(truth, setpoints(time, truth), shaft), seconds)
 

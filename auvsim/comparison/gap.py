@@ -1,0 +1,243 @@
+"""How far a simulation is from a log: errors by horizon, spectra of residuals, the coefficient that explains them."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.signal import welch
+
+from auvsim.base.errors import InputError
+from auvsim.comparison.simulation import in_mujoco, in_planar
+from auvsim.identification.fit import DEFAULT_FREE, Nuisances
+from auvsim.identification.records import Record
+from auvsim.identification.states import smoothed
+from auvsim.physics.planar_fit import fit_planar_model
+from estimators.core.types import Array
+from estimators.planar.model import PlanarParameters
+
+HORIZONS = (10.0, 30.0, 60.0, 120.0)  # [s]
+LEAD, EVERY = 20.0, 10.0  # before the first start, and from one to the next [s]
+LEAST = 40.0  # of a record [s]
+# Largest error after 60 s by the distance run for each grade, and the next; a worse one is E.
+GRADES = (("A", 0.02), ("B", 0.05), ("C", 0.10), ("D", 0.20))
+GRADED = 60.0  # horizon of the grade [s]; the longest there is where a record is shorter
+VELOCITIES = ("surge", "sway", "yaw rate")
+CANDIDATES = (*DEFAULT_FREE, "X_ud", "Y_vd", "N_rd")
+FLOOR = np.array([0.01, 0.01, math.radians(0.2)])  # residuals that no coefficient is sought for [m/s, m/s, rad/s]
+NEAR = 0.03  # share explained by which two coefficients are not told apart
+BLOCK, DRAWS = 20.0, 200  # of the bootstrap [s]
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Beside:
+    """One record and one model of the vehicle."""
+
+    record: Record
+    measured: Array  # (n, 12) states by what was measured, without hydrodynamics (see `states`)
+    simulated: Array  # (n, 3) surge, sway, yaw rate [m/s, m/s, rad/s]
+
+    @property
+    def residual(self) -> Array:
+        """(n, 3) measured less simulated, after the lead."""
+        return (self.measured[:, 3:6] - self.simulated)[self.first :]
+
+    @property
+    def first(self) -> int:
+        """Sample at which the lead ends."""
+        return round(LEAD / self.record.step)
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Explanation:
+    """What a change of one coefficient explains of the residuals."""
+
+    name: str
+    change: float  # of the coefficient, by its size in the model
+    low: float  # of the 95 % interval of that
+    high: float
+    share: float  # of the residuals' weighed squares that it takes away
+
+
+@dataclass(frozen=True, kw_only=True, slots=True)
+class Gap:
+    """What the sheet says."""
+
+    vehicle: str
+    records: tuple[Beside, ...]
+    planar: tuple[Beside, ...]  # the same by the planar model, if one is given
+    errors: dict[float, float]  # rms over starts by the distance run, by horizon [s]
+    planar_errors: dict[float, float]
+    starts: int
+    explanations: tuple[Explanation, ...]  # all candidates, the best first
+    size: Array  # (3,) rms of the residuals in surge, sway [m/s] and yaw rate [rad/s]
+    grade: str
+    graded: float  # horizon of the grade [s]
+    notes: tuple[str, ...]
+
+    @property
+    def explained(self) -> tuple[Explanation, ...]:
+        """The best coefficient and those that cannot be told from it; none where there is nothing to explain."""
+        best = self.explanations[0]
+        if (self.size < FLOOR).all() or best.share < 0.2 or best.low <= 0.0 <= best.high:
+            return ()
+        return tuple(e for e in self.explanations if e.share > best.share - NEAR)
+
+    @property
+    def verdict(self) -> str:
+        """The sheet in one line."""
+        error = f"off by {self.errors[self.graded]:.1%} of the distance run after {self.graded:.0f} s"
+        said = f"grade {self.grade}: {self.vehicle} is {error}"
+        if not self.explained:
+            return f"{said}; no one coefficient explains the rest"
+        best, *near = self.explained
+        text = f"{best.name} {best.change:+.0%} ({best.low:+.0%} to {best.high:+.0%}) explains {best.share:.0%} of it"
+        return f"{said}; {text}" + (f", as would {' or '.join(e.name for e in near)}" if near else "")
+
+
+def compare(
+    records: Sequence[Record], vehicle: str, parameters: PlanarParameters | None = None, *,
+    measured: bool = True, notes: Sequence[str] = (), progress: Callable[[float], None] = lambda _: None,
+) -> Gap:  # fmt: skip
+    """Holds a vehicle's model against records.
+
+    Args:
+        records: Of the log.
+        vehicle: Name in models/, or the path of an MJCF file.
+        parameters: A planar model that is held against them too.
+        measured: Whether rudders were measured, not only commanded.
+        notes: On how the log was understood.
+        progress: Told the share that is done.
+
+    Raises:
+        InputError: No record is long enough, or the vehicle has no rudder.
+    """
+    usable = [record for record in records if record.duration >= LEAST]
+    if not usable:
+        longest = max((record.duration for record in records), default=0.0)
+        raise InputError(f"the longest record lasts {longest:.0f} s; the comparison needs {LEAST:.0f} s of motion")
+    found, planar = [], []
+    base = fit_planar_model(vehicle, 1.0).parameters
+    for k, record in enumerate(usable):
+        states = smoothed(record, base, Nuisances().vector())
+        surge = float(np.clip(states[0, 3], 0.05, None))
+        velocities = in_mujoco(vehicle, record, surge, measured=measured)
+        found.append(Beside(record=record, measured=states, simulated=velocities))
+        if parameters is not None:
+            walked = in_planar(parameters, record, surge)
+            planar.append(Beside(record=record, measured=states, simulated=walked))
+        progress((k + 1) / (len(usable) + 1))
+    errors, starts = by_horizon(found)
+    graded = max(h for h in errors if h <= GRADED)
+    mean = float(np.mean(np.concatenate([b.measured[:, 3] for b in found])))
+    condensed = fit_planar_model(vehicle, max(mean, 0.2)).parameters
+    residuals = np.concatenate([beside.residual for beside in found])
+    return Gap(
+        vehicle=vehicle, records=tuple(found), planar=tuple(planar), errors=errors,
+        planar_errors=by_horizon(planar)[0] if planar else {}, starts=starts,
+        explanations=explain(found, condensed), size=np.sqrt(np.mean(residuals**2, axis=0)),
+        grade=next((grade for grade, most in GRADES if errors[graded] <= most), "E"), graded=graded,
+        notes=tuple(notes),
+    )  # fmt: skip
+
+
+def by_horizon(besides: Sequence[Beside]) -> tuple[dict[float, float], int]:
+    """Errors of the position by the distance run, rms over starts every few seconds, by horizon; and how many starts.
+
+    Each start takes the measured place and heading, and the current that the record shows; the velocities go on as they
+    were simulated from the record's beginning.
+    """
+    squares: dict[float, list[float]] = {}
+    starts = 0
+    for beside in besides:
+        step, n = beside.record.step, len(beside.record.times)
+        for first in range(beside.first, n - 1, max(1, round(EVERY / step))):
+            track, run = reckoned(beside, first)
+            starts += 1
+            for horizon in HORIZONS:
+                last = round(horizon / step)
+                if first + last < n and run[last] > 0.0:
+                    off = track[last] - beside.measured[first + last, :2]
+                    squares.setdefault(horizon, []).append(float(off @ off) / run[last] ** 2)
+    return {horizon: math.sqrt(float(np.mean(values))) for horizon, values in sorted(squares.items())}, starts
+
+
+def reckoned(beside: Beside, first: int) -> tuple[Array, Array]:
+    """Track (m, 2) north, east [m] by the simulated velocities from a sample on, and the distance run (m,) [m]."""
+    step = beside.record.step
+    u, v, r = beside.simulated[first:].T
+    heading = beside.measured[first, 2] + np.concatenate([[0.0], np.cumsum(0.5 * step * (r[1:] + r[:-1]))])
+    current = beside.measured[-1, 6] + 1j * beside.measured[-1, 7]
+    water = (u + 1j * v) * np.exp(1j * heading)
+    over_ground = water + current
+    place = beside.measured[first, 0] + 1j * beside.measured[first, 1]
+    way = np.concatenate([[0.0], np.cumsum(0.5 * step * (over_ground[1:] + over_ground[:-1]))])
+    run = np.concatenate([[0.0], np.cumsum(0.5 * step * (np.abs(water[1:]) + np.abs(water[:-1])))])
+    track = place + way
+    return np.column_stack([track.real, track.imag]), run
+
+
+def explain(besides: Sequence[Beside], condensed: PlanarParameters) -> tuple[Explanation, ...]:
+    """What each coefficient of the planar model alone explains of the residuals, the best first.
+
+    The residuals of surge, sway and yaw rate, each by the rms of its motion, are regressed on the change that a change
+    of the coefficient makes in the planar model's own motion under the same inputs; the interval is by a bootstrap over
+    blocks.
+    """
+    moving = np.concatenate([b.measured[b.first :, 3:6] for b in besides])
+    scale = np.maximum(np.std(moving, axis=0), 2.0 * FLOOR)
+    residuals = [b.residual / scale for b in besides]
+    found = []
+    for name in CANDIDATES:
+        value = float(getattr(condensed, name))
+        if value == 0.0:
+            continue
+        slopes = [_slope(b, condensed, name, value) / scale for b in besides]
+        if all(np.isfinite(s).all() for s in slopes):
+            found.append(_regressed(name, besides, residuals, slopes))
+    return tuple(sorted(found, key=lambda e: -e.share))
+
+
+def _slope(beside: Beside, condensed: PlanarParameters, name: str, value: float) -> Array:
+    """Derivative (m, 3) of the velocities by the coefficient, times its size, by central differences."""
+    surge = float(beside.simulated[0, 0])
+    up, down = (
+        in_planar(replace(condensed, **{name: value * (1.0 + part)}), beside.record, surge) for part in (0.05, -0.05)
+    )
+    return (up - down)[beside.first :] / 0.1
+
+
+def _regressed(
+    name: str, besides: Sequence[Beside], residuals: Sequence[Array], slopes: Sequence[Array]
+) -> Explanation:
+    sums = []  # of each block: slope squared, slope times residual
+    for beside, residual, slope in zip(besides, residuals, slopes, strict=True):
+        edges = np.arange(0, len(residual), max(1, round(BLOCK / beside.record.step)))
+        squares = np.add.reduceat((slope**2).sum(axis=1), edges)
+        products = np.add.reduceat((slope * residual).sum(axis=1), edges)
+        sums.append(np.column_stack([squares, products]))
+    blocks = np.concatenate(sums)
+    squares, products = blocks.sum(axis=0)
+    total = sum(float((residual**2).sum()) for residual in residuals)
+    if squares <= 0.0 or total <= 0.0:
+        return Explanation(name=name, change=0.0, low=0.0, high=0.0, share=0.0)
+    drawn = np.random.default_rng(0).integers(len(blocks), size=(DRAWS, len(blocks)))
+    resampled = blocks[drawn].sum(axis=1)
+    low, high = np.percentile(resampled[:, 1] / np.maximum(resampled[:, 0], 1e-300), (2.5, 97.5))
+    return Explanation(
+        name=name, change=float(products / squares), low=float(low), high=float(high),
+        share=float(products**2 / squares / total),
+    )  # fmt: skip
+
+
+def spectra(besides: Sequence[Beside]) -> list[tuple[Array, Array, Array]]:
+    """Of surge, sway and yaw rate: frequencies (m,) [Hz], and densities of the motion and of the residual (Welch)."""
+    longest = max(besides, key=lambda b: b.record.duration)
+    rate = 1.0 / longest.record.step
+    width = min(len(longest.residual), round(60.0 * rate))
+    found = []
+    for k in range(3):
+        f, motion = welch(longest.measured[longest.first :, 3 + k], rate, nperseg=width)
+        _, rest = welch(longest.residual[:, k], rate, nperseg=width)
+        found.append((f[1:], motion[1:], rest[1:]))
+    return found
