@@ -89,7 +89,7 @@ def _run(
                     readings, judging, vehicle=_stem(vehicle), model=vehicle, steps=chosen, progress=progress
                 )
             if vehicle is None or motion:
-                named = "vehicle" if vehicle is None else _stem(vehicle)
+                named = planar_sets.UNNAMED if vehicle is None else _stem(vehicle)
                 given = {"name": named, "hull": known, "quick": quick, "progress": progress}
                 chosen_motion = _motion(readings, judging, given, alone=planar is None)
         if planar is not None:

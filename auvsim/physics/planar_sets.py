@@ -18,6 +18,7 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
 
+UNNAMED = "vehicle"  # of a log alone, without a model
 CONDENSE = "condense"  # names no file but the model that is fitted to the vehicle
 SUFFIX = ".yaml"
 UNITS = {
@@ -156,20 +157,27 @@ def find(name: str, vehicle: str) -> Path:
 def load(name: str, vehicle: str) -> PlanarParameters:
     """Reads the parameters of a set, by its name among the vehicle's or by its path.
 
+    A set that was identified from the log of a vehicle without a name may be believed of any.
+
     Raises:
         InputError: There is no such set, it cannot be read, or it is another vehicle's.
     """
     path = find(name, vehicle)
     found = read(path)
     wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
-    if found.vehicle != wanted:
+    if found.vehicle not in (wanted, UNNAMED):
         raise InputError(f"{path}: these are parameters of '{found.vehicle}', not of '{wanted}'")
     parameters = found.planar()
-    _check(parameters, path)
+    _check(parameters, found.speed, path)
     return parameters
 
 
-def _check(p: PlanarParameters, path: Path) -> None:
+def dissipates(p: PlanarParameters, speed: float) -> bool:
+    """Whether surge's drag as a whole slows the vehicle at a speed [m/s] and at all beyond it."""
+    return p.X_uu <= 0.0 and p.X_uu * speed + p.X_u <= 0.0
+
+
+def _check(p: PlanarParameters, speed: float, path: Path) -> None:
     """Sees that a vehicle of these parameters has inertia in every direction and is slowed by its drag.
 
     Raises:
@@ -189,9 +197,11 @@ def _check(p: PlanarParameters, path: Path) -> None:
     if not (p.m - p.Y_vd) * (p.I_z - p.N_rd) > coupled:
         sum_of = "m, x_g, I_z, Y_vd, Y_rd, N_vd, N_rd"
         raise InputError(f"{path}: parameters: the inertia in sway and yaw ({sum_of}) is not positive definite")
-    for name, value in (("X_uu", p.X_uu), ("X_u", p.X_u)):
-        if value > 0.0:
-            raise InputError(f"{path}: parameters: {name} is {value:g}; drag is negative here")
+    if not dissipates(p, speed):
+        raise InputError(
+            f"{path}: parameters: surge's drag, X_uu {p.X_uu:g} and X_u {p.X_u:g}, drives it at {speed:.2g} m/s "
+            "or beyond; X_uu and X_uu u + X_u must not be above 0"
+        )
 
 
 def assumed(model: str, vehicle: str, speed: float, density: float = SEA_WATER) -> PlanarParameters:

@@ -17,9 +17,9 @@ from auvsim.base.errors import InputError
 from auvsim.cli import identify as command
 from auvsim.identification.motion import data, files, fit, lags
 from auvsim.identification.motion import report as motion_report
-from auvsim.identification.motion.choice import Candidate, choose, seen, simplest
+from auvsim.identification.motion.choice import Candidate, Folds, choose, seen, simplest
 from auvsim.identification.motion.dimensions import Dimensions, coefficients
-from auvsim.identification.motion.identify import MotionIdentification, identify_motion, verdicts
+from auvsim.identification.motion.identify import MotionIdentification, _planar, identify_motion, verdicts
 from auvsim.identification.motion.rollout import persistence, roll
 from auvsim.identification.motion.uncertainty import halves, of_left_out
 from auvsim.identification.pipeline import Identification
@@ -382,6 +382,16 @@ def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, caps
     parameters = planar_sets.read(tmp_path / "o" / "parameters.yaml").planar()
     process = PlanarProcess(parameters, np.zeros(8))
     assert np.isfinite(process.evaluate(np.array([0, 0, 0, 1.0, 0, 0, 0, 0]), (0.1, 60.0), 60.0)).all()
+    # The third command of README believes it too: of a vehicle without a name it is nobody else's.
+    believed = str(tmp_path / "o" / "parameters.yaml")
+    trial = ["dock", "--seed", "3", "--duration", "20", "--no-video", "--out", str(tmp_path / "dock")]
+    assert cli.main([*trial, "--estimator.model", believed]) == 0
+    captured = capsys.readouterr()
+    assert "not docked within 20 s" in captured.out
+    named = tmp_path / "named.yaml"
+    named.write_text((tmp_path / "o" / "parameters.yaml").read_text().replace("vehicle: vehicle", "vehicle: lauv"))
+    assert cli.main([*trial, "--estimator.model", str(named)]) == 2
+    assert "these are parameters of 'lauv', not of 'remus100'" in capsys.readouterr().err
 
 
 def test_the_page_shows_names_as_text(found: MotionIdentification) -> None:
@@ -485,3 +495,30 @@ def test_halves_go_as_far_as_both_converge() -> None:
     assert halves([motion], found).step == fit.STEPS[0]
     astray = replace(again, values=again.values * np.nan)
     assert halves([motion], again, [again, astray]).step == fit.STEPS[1]
+
+
+def test_drag_is_judged_as_a_whole() -> None:
+    """A linear term may have either sign where quadratic drag outweighs it; what grows with speed may not."""
+    for (quadratic, linear, speed), slows in (
+        ((-2.0, -1.0, 0.5), True), ((-2.0, 0.9, 0.5), True), ((-2.0, 1.1, 0.5), False), ((0.1, -5.0, 0.5), False),
+    ):  # fmt: skip
+        p = PlanarParameters(m=1.0, I_z=1.0, X_uu=quadratic, X_u=linear)
+        assert planar_sets.dissipates(p, speed) is slows
+
+
+def test_the_planar_set_is_of_a_candidate_that_drag_slows(found: MotionIdentification) -> None:
+    """The best planar candidate whose drag slows the vehicle; a faster vehicle than any drag stops leaves none."""
+    assert found.planar is not None
+    best, own = found.planar
+    assert planar_sets.dissipates(planar_parameters(own.coefficients), found.speed)
+    slower = [
+        c for c in found.choice.candidates
+        if set(c.structure.terms) <= set(PLANAR) and c.error < best.error and c.converged
+        and planar_sets.dissipates(
+            planar_parameters(found.choice.folds.fit(c.structure, c.step, -1).coefficients), found.speed
+        )
+    ]  # fmt: skip
+    assert not slower
+    reversed_drag = {key: replace(f, values=-f.values) for key, f in found.choice.folds._fits.items()}
+    folds = SimpleNamespace(fit=lambda structure, step, fold: reversed_drag[structure.terms, step, fold])
+    assert _planar(replace(found.choice, folds=cast(Folds, folds)), found.speed) is None

@@ -15,6 +15,7 @@ from auvsim.identification.motion.lags import Lags
 from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence, rms, roll
 from auvsim.identification.motion.uncertainty import Halves, Held, Spread, halves, held, held_of, of_left_out, spread
 from auvsim.identification.records import Readings, Record
+from auvsim.physics.planar_sets import dissipates
 from estimators.core.types import Array
 from estimators.planar.model import SURGE_LIMIT, SWAY_LIMIT, YAW_RATE_LIMIT, PlanarParameters
 from estimators.planar.terms import AXES, PLANAR, TermsProcess, planar_parameters
@@ -139,10 +140,11 @@ def identify_motion(
         if judging
     )
     say("done", 1.0)
+    speed = float(np.mean([m.states[:, 3].mean() for m in motions]))
     return MotionIdentification(
         name=name, choice=choice, covariance=own, spread=found, left_out=held_of(left_out, found), holdout=judged,
         steps=steps, none=rms([persistence(m, ends).shares for m in targets]), halves=apart,
-        planar=_planar(choice), lags=known, speed=float(np.mean([m.states[:, 3].mean() for m in motions])),
+        planar=_planar(choice, speed), lags=known, speed=speed,
         notes=tuple(known.notes), readings=readings,
     )  # fmt: skip
 
@@ -162,14 +164,15 @@ def _check(records: Sequence[Record]) -> None:
         )
 
 
-def _planar(choice: Choice) -> tuple[Candidate, MotionFit] | None:
-    """The best candidate whose terms are all the planar model's, and its fit to all of the data."""
-    fitting = [c for c in choice.candidates if set(c.structure.terms) <= set(PLANAR)]
-    settled = [c for c in fitting if c.converged] or fitting
-    if not settled:
-        return None
-    best = settled[0]
-    return best, choice.folds.fit(best.structure, best.step, -1)
+def _planar(choice: Choice, speed: float) -> tuple[Candidate, MotionFit] | None:
+    """The best candidate whose terms are all the planar model's and whose drag slows it; its fit to all of the data."""
+    fitting = [
+        (c, choice.folds.fit(c.structure, c.step, -1))
+        for c in choice.candidates
+        if set(c.structure.terms) <= set(PLANAR)
+    ]
+    slowed = [pair for pair in fitting if dissipates(planar_parameters(pair[1].coefficients), speed)]
+    return next((pair for pair in slowed if pair[0].converged), slowed[0] if slowed else None)
 
 
 def planar(found: MotionIdentification, masses: PlanarParameters | None = None) -> PlanarParameters | None:
