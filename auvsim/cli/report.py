@@ -223,6 +223,9 @@ def manoeuvres(found: Sequence[Figures]) -> None:
         if any(key in figures.numbers for figures in found):
             table.add_row(label, *(_text(figures.numbers.get(key)) for figures in found))
     Console(markup=False).print(table)  # units stand in brackets
+    for figures in found:
+        if figures.warning:
+            print(f"{figures.kind}: {figures.warning}", file=sys.stderr)
 
 
 def information(parameters: Sequence[str], outcomes: "Mapping[str, Outcome]", room: float) -> None:

@@ -54,6 +54,8 @@ def from_sheet(path: Path, out: Path) -> int:
     from auvsim.vehicles import sheet
 
     made = sheet.read(path)
+    if made.name in library.shipped("vehicle"):
+        raise InputError(f"{path}: name: '{made.name}' is a vehicle that auvsim ships; give it a name of its own")
     try:
         made_of.numbers(made)
     except InputError as error:

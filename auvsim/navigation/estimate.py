@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -79,7 +80,7 @@ class Estimate:
 
 
 @lru_cache(maxsize=64)
-def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[Array, ...]]:
+def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[Any, ...]]:
     """Those of the states that are wanted, in their order, and the index of their block in a covariance."""
     places = [k for k, name in enumerate(names) if name in wanted]
     return tuple(names[k] for k in places), np.ix_(places, places)

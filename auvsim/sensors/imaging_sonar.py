@@ -23,6 +23,16 @@ OBJECT_ECHO = 1.0  # backscatter of a hull or frame by that of sand at normal in
 TEMPERATURE = 10.0  # of the water that absorbs [deg C]
 
 
+# Data sheets: Blueprint Subsea, Oculus M750d (750 kHz: 130 deg, 512 beams at 0.25 deg, 1 deg, elevation 20 deg, 0.1 to
+# 120 m, up to 40 Hz); Teledyne BlueView M900 series (900 kHz: 130 deg, 768 beams at 0.18 deg, 1 deg, elevation 20 deg,
+# to 100 m, up to 25 Hz). Their farthest ranges are cut to those at which a floor still echoes.
+_BOTH = {"sector_deg": 130.0, "beam_width_deg": 1.0, "elevation_deg": 20.0}
+PRESETS: dict[str, dict[str, float]] = {
+    "oculus_m750d": {**_BOTH, "beams": 512, "frequency": 750.0},
+    "blueview_m900": {**_BOTH, "beams": 768, "frequency": 900.0},
+}
+
+
 class ImagingSonarSettings(Settings):
     """A multibeam imaging sonar that looks ahead and down.
 
@@ -69,15 +79,16 @@ class ImagingSonarSettings(Settings):
             raise ValueError(f"maximum_range must be more than minimum_range, {self.minimum_range:g} m")
         return self
 
-
-# Data sheets: Blueprint Subsea, Oculus M750d (750 kHz: 130 deg, 512 beams at 0.25 deg, 1 deg, elevation 20 deg, 0.1 to
-# 120 m, up to 40 Hz); Teledyne BlueView M900 series (900 kHz: 130 deg, 768 beams at 0.18 deg, 1 deg, elevation 20 deg,
-# to 100 m, up to 25 Hz). Their farthest ranges are cut to those at which a floor still echoes.
-_BOTH = {"sector_deg": 130.0, "beam_width_deg": 1.0, "elevation_deg": 20.0}
-PRESETS: dict[str, dict[str, float]] = {
-    "oculus_m750d": {**_BOTH, "beams": 512, "frequency": 750.0},
-    "blueview_m900": {**_BOTH, "beams": 768, "frequency": 900.0},
-}
+    @model_validator(mode="after")
+    def _preset_is_whole(self) -> "ImagingSonarSettings":
+        for name, number in PRESETS.get(self.preset, {}).items():
+            given = getattr(self, name)
+            if given not in (number, type(self).model_fields[name].default):
+                raise ValueError(
+                    f"{name}: {given:g} contradicts the preset {self.preset}, which has {number:g}; leave one of the "
+                    "two out"
+                )
+        return self
 
 
 class ImagingSonar(Sensor):

@@ -28,6 +28,7 @@ from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
+from auvsim.water.seabed import SeabedSettings
 from auvsim.water.settings import CurrentSettings, UniformSettings
 from auvsim.water.terrain import FlatSettings, TerrainSettings
 
@@ -301,10 +302,24 @@ def check_depths(scenario: Scenario) -> None:
         InputError: one is not; the text begins with its dotted key.
     """
     terrain = scenario.world.floor
+    if isinstance(scenario.water.terrain, SeabedSettings):
+        _check_floor(scenario, scenario.water.terrain)
     for key, north, east, depth in _places(scenario):
         floor = terrain.depth(north, east)
         if not 0.0 < depth < floor:
             raise InputError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
+
+
+def _check_floor(scenario: Scenario, floor: SeabedSettings) -> None:
+    """Sees that something of the scenario is on or near a generated floor, beside which the sea floor is even."""
+    (x, y), near = floor.center, 1.5 * 0.5 * floor.extent
+    places = [(north, east) for _, north, east, _ in _places(scenario)]
+    if places and all(max(abs(north - x), abs(east - y)) > near for north, east in places):
+        away = min(math.hypot(north - x, east - y) for north, east in places)
+        raise InputError(
+            f"water.terrain.center: the generated sea floor of {floor.extent:g} m lies {away:.0f} m from the nearest "
+            "vehicle, waypoint or structure; move it there or give a larger extent"
+        )
 
 
 def _places(scenario: Scenario) -> Iterator[tuple[str, float, float, float]]:

@@ -203,7 +203,7 @@ def run(model: str, progress: Callable[[float], None] = lambda _: None) -> SeaTr
     return SeaTrials(
         model=vehicle.model, mass=level.mass, buoyancy=buoyancy, length=vehicle.length, speeds=speeds, cruise=cruise,
         pitch=float(attitude[1]), elevator=float(actuators[1]), roll=float(attitude[0]), turns=tuple(turns),
-        zigzag=zigzag(motion), zigzag_series=np.stack([motion.time, motion.heading, rudders], axis=-1),
+        zigzag=zigzag(motion, ZIGZAG), zigzag_series=np.stack([motion.time, motion.heading, rudders], axis=-1),
         dive_series=np.array([(PERIOD * k, depths[k], t.attitude[1]) for k, t in enumerate(dive)]),
         dive_time=late, dive_overshoot=float(max(depths.max() - DIVE, 0.0)), astern=astern, coasting=coasting, fit=fit,
     )  # fmt: skip

@@ -76,8 +76,11 @@ def _read(path: Path) -> str:
     try:
         state = path.stat()
         return _text(path, state.st_mtime_ns, state.st_size)
+    except FileNotFoundError:
+        raise InputError(f"model {path}: there is no such file; give a shipped model's name or an MJCF file") from None
     except (OSError, UnicodeDecodeError) as error:
-        raise InputError(f"model {path}: {error}") from None
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"model {path}: it cannot be read: {reason}") from None
 
 
 @lru_cache(maxsize=64)
@@ -100,9 +103,14 @@ def find(kind: str, name: str) -> Path:
     folder = models_folder()
     path = folder / name / f"{name}.xml"
     if not INSTANCE.fullmatch(name) or not path.is_file():
-        known = [p.stem for p in folder.glob("*/*.xml") if p.stem == p.parent.name and _MARKS[kind] in _read(p)]
-        raise unknown_name(kind, name, known)
+        raise unknown_name(kind, name, shipped(kind))
     return path
+
+
+def shipped(kind: str) -> list[str]:
+    """Names of the models that auvsim ships; `kind` as of `find`."""
+    found = models_folder().glob("*/*.xml")
+    return [path.stem for path in found if path.stem == path.parent.name and _MARKS[kind] in _read(path)]
 
 
 @contextmanager

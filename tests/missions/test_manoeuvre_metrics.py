@@ -9,6 +9,7 @@ from synthetic import trial_log, writer
 from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import euler_to_quaternion, rotation, wrap
+from auvsim.cli import report
 from auvsim.data.log import VehicleLog
 from auvsim.missions.manoeuvres import metrics
 from auvsim.missions.manoeuvres.metrics import Motion
@@ -95,7 +96,7 @@ def test_zigzag_overshoots_and_period() -> None:
         time=step * np.arange(count), track=np.zeros((count, 2)), heading=np.radians(heading),
         velocity=np.zeros((count, 3)), depth=np.zeros(count), rudder=np.array(rudder), shaft_speed=np.zeros(count),
     )  # fmt: skip
-    found = metrics.zigzag(motion)
+    found = metrics.zigzag(motion, 10.0)
     # The heading is taken from the first sample after the change, a twentieth of the way up the parabola: 10 % less.
     first_rise = 1.0 - (0.05 * (2.0 - 0.05))
     assert found["first_overshoot_deg"] == pytest.approx(3.0 * first_rise)
@@ -103,6 +104,30 @@ def test_zigzag_overshoots_and_period() -> None:
     assert found["mean_overshoot_deg"] == pytest.approx(2.125 * first_rise)
     assert found["initial_turning_time"] == pytest.approx(step * changes[0])
     assert found["period"] == pytest.approx(step * np.mean([changes[2] - changes[0], changes[3] - changes[1]]))
+
+
+@pytest.mark.parametrize(("off", "swings"), [(2.4, False), (-2.4, False), (2.6, True), (-9.0, True), (12.0, True)])
+def test_a_vehicle_that_oscillates_has_no_overshoots(off: float, swings: bool) -> None:
+    """It is off its course by more than a quarter of the switching angle when the zig-zag begins."""
+    time = np.arange(0.0, 60.0, 0.1)
+    heading = off * np.cos(time) + 12.0 * np.sin(0.5 * time)
+    count = len(time)
+    motion = Motion(
+        time=time, track=np.zeros((count, 2)), heading=np.radians(heading), velocity=np.zeros((count, 3)),
+        depth=np.zeros(count), rudder=np.sign(np.cos(0.5 * time)), shaft_speed=np.zeros(count),
+    )  # fmt: skip
+    found = metrics.zigzag(motion, 10.0)
+    assert (set(found.values()) == {None}) == swings
+    assert metrics.oscillates(motion, 10.0) == swings
+
+
+def test_an_oscillating_vehicle_is_told(capsys) -> None:
+    """In the figures of its log, and on the screen."""
+    log: VehicleLog = manoeuvre_log("zigzag", lambda t: 0.2 * math.sin(2.0 * (t - APPROACH) + 1.0), until=60.0)
+    (found,) = metrics.figures(log)
+    assert found.numbers["first_overshoot_deg"] is None
+    report.manoeuvres([found])
+    assert "the vehicle oscillates by itself: when the zig-zag began it was" in capsys.readouterr().err
 
 
 def spiral_motion(settings: SpiralSettings, loop: float) -> Motion:

@@ -139,3 +139,11 @@ def test_a_trial_believes_the_set_it_is_given(tmp_path: Path, monkeypatch: pytes
         speeds.append(simulation.agents[0].commands.shaft_speed)
     assert handed == [fit_planar_model("remus100", 1.0).parameters, wrong]
     assert speeds[0] == speeds[1]
+
+
+def test_the_shipped_set_is_of_its_vehicle_and_better_than_its_start():
+    """Masses are the vehicle's; what was held out it predicts better than the model fitted to MuJoCo's forces."""
+    found = planar_sets.read(planar_sets.find("identified", "remus100_x"))
+    assert planar_sets.load("identified", "remus100_x").m == pytest.approx(31.03, abs=0.01)
+    assert found.hold_out is not None
+    assert found.hold_out.share < 0.5 * found.hold_out.start_share

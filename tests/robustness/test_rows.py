@@ -395,3 +395,51 @@ def test_a_track_faster_than_the_shaft(capsys) -> None:
     """It would be run at the most there is, and none would know."""
     line = refused(capsys, "run", "leader_follower", "--vehicles.leader.mission.speed", "50", "--duration", "4")
     assert line.startswith("command line: vehicles.leader.mission.speed: 50 m/s is more than 'remus100' can hold")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ("vehicle nowhere/mine.xml", "model nowhere/mine.xml: there is no such file"),
+        ("dock --vehicle.model nowhere.xml", "model nowhere.xml: there is no such file"),
+        (
+            "dock --world.terrain {kind: generated, center: [3000, 0], spacing: 2.0}",
+            "the generated sea floor of 256 m lies",
+        ),
+    ],
+)
+def test_what_would_be_silent_or_raw(capsys, arguments: str, says: str) -> None:
+    """Files that are not there, a generated floor that nothing is near."""
+    assert says in refused(capsys, *arguments.split(maxsplit=2))
+
+
+@pytest.mark.parametrize(
+    ("preset", "key", "value", "own"),
+    [("oculus_m750d", "beams", 64, 512), ("blueview_m900", "frequency", 300.0, 900), ("oculus_m750d", "beams", 512, 0)],
+)
+def test_a_key_beside_a_preset_is_not_passed_over(capsys, preset: str, key: str, value: float, own: int) -> None:
+    """One that says the same is taken, as the full form of a log has it."""
+    Path("sonar.yaml").write_text(
+        f"duration: 1\nsensors: {{mine: {{kind: imaging_sonar, preset: {preset}, {key}: {value}}}}}"
+    )
+    if not own:
+        assert main(["scenario", "sonar.yaml"]) == 0
+        return
+    says = f"{key}: {value:g} contradicts the preset {preset}, which has {own}; leave one of the two out"
+    assert says in refused(capsys, "dock", "sonar.yaml")
+
+
+def test_a_floor_near_a_start_or_a_dock_is_taken() -> None:
+    """Its edge is not the end of the water."""
+    scenario.parse({"world": {"terrain": {"kind": "generated", "center": [150.0, 0.0], "spacing": 2.0}}})
+
+
+@pytest.mark.parametrize("name", ["remus100", "lauv", "bluerov2_heavy"])
+def test_a_sheet_does_not_take_a_shipped_name(capsys, name: str) -> None:
+    Path("sheet.yaml").write_text(
+        f"{{name: {name}, length: 1.6, diameter: 0.19, mass: 31.0, top_speed: 2.5, shaft_rpm: 1500,"
+        " fins: {span: 0.086, chord: 0.077, place: 0.69}}"
+    )
+    line = refused(capsys, "vehicle", "--from", "sheet.yaml", "--out", "mine")
+    assert line == f"sheet.yaml: name: '{name}' is a vehicle that auvsim ships; give it a name of its own"
+    assert not Path("mine").exists()

@@ -31,6 +31,7 @@ from auvsim.missions.manoeuvres.settings import (
 )
 from auvsim.missions.mission import Metric
 
+STRAIGHT = 0.25  # of its switching angle, by which a zig-zag may begin off its course
 STEADY = 0.25  # last share of a held rudder or speed over which it counts as steady
 
 NUMBERS: Mapping[str, Metric] = {  # what `figures` may give of a manoeuvre
@@ -88,6 +89,7 @@ class Figures:
     kind: str
     start: float  # end of its approach [s]
     numbers: dict[str, float | None]
+    warning: str = ""  # why some of them are None
 
 
 def is_manoeuvre(log: VehicleLog) -> bool:
@@ -147,8 +149,19 @@ def figures(log: VehicleLog) -> list[Figures]:
         moved = motion(log, start + part.approach, start + part.duration)
         if len(moved.time) > 1:
             numbers = _common(moved) | _particular(part, moved)
-            found.append(Figures(kind=laws.name(part), start=start + part.approach, numbers=numbers))
+            warning = _warning(part, moved)
+            found.append(Figures(kind=laws.name(part), start=start + part.approach, numbers=numbers, warning=warning))
     return found
+
+
+def _warning(part: Simple, moved: Motion) -> str:
+    if not (isinstance(part, ZigzagSettings) and oscillates(moved, part.heading_deg)):
+        return ""
+    off = math.degrees(abs(moved.heading[0]))
+    return (
+        f"the vehicle oscillates by itself: when the zig-zag began it was {off:.1f} deg off its course, so overshoots "
+        "and times are not given; lower control.heading_gain, or give a longer approach"
+    )
 
 
 def motion(log: VehicleLog, start: float, end: float) -> Motion:
@@ -203,7 +216,7 @@ def _common(m: Motion) -> dict[str, float | None]:
 def _particular(settings: Simple, m: Motion) -> dict[str, float | None]:
     match settings:
         case ZigzagSettings():
-            return {"switch_deg": settings.heading_deg, **zigzag(m)}
+            return {"switch_deg": settings.heading_deg, **zigzag(m, settings.heading_deg)}
         case CircleSettings():
             return circle(m)
         case SpiralSettings():
@@ -221,8 +234,22 @@ def switches(m: Motion) -> NDArray[np.intp]:
     return np.flatnonzero(side[1:] * side[:-1] < 0.0) + 1
 
 
-def zigzag(m: Motion) -> dict[str, float | None]:
-    """Figures of a zig-zag: an overshoot is what the heading still turns after the rudder has changed sides."""
+def oscillates(m: Motion, switch_deg: float) -> bool:
+    """Whether a zig-zag began off its course by more than a share of its switching angle, as of a vehicle that swings.
+
+    Its first figures then tell of where in its swing the vehicle was, not of the rudder.
+    """
+    return bool(math.degrees(abs(m.heading[0])) > STRAIGHT * switch_deg)
+
+
+def zigzag(m: Motion, switch_deg: float) -> dict[str, float | None]:
+    """Figures of a zig-zag: an overshoot is what the heading still turns after the rudder has changed sides.
+
+    There are none of the first turns where the vehicle oscillated before.
+    """
+    if oscillates(m, switch_deg):
+        names = ("initial_turning_time", "first_overshoot_deg", "second_overshoot_deg", "mean_overshoot_deg", "period")
+        return dict.fromkeys(names)
     at = switches(m)
     overshoots = []
     for begin, end in zip(at, [*at[1:], len(m.time)], strict=True):
