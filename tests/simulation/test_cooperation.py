@@ -72,7 +72,7 @@ def test_a_second_leader_helps():
 
 @pytest.mark.slow
 def test_ranges_between_followers_help_the_one_that_hardly_hears_the_leader():
-    """The leader is 800 m away in noise that few of its packets get through; a follower carries its knowledge on."""
+    """Few packets get through from 800 m in this noise; a follower between them carries its knowledge on."""
     bank = {"kind": "motion_radius"}
     quiet = copy("follower", estimator=bank, start=at(60.0, -900.0, 48.0, 11.0))
     network = SLOTS | {"noise_level": 107.0, "fading": 0.0}
