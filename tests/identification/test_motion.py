@@ -493,7 +493,7 @@ def test_halves_go_as_far_as_both_converge() -> None:
     assert by_step.step == fit.STEPS[1]
     assert by_step.scores.shape == (6,)
     assert halves([motion], found).step == fit.STEPS[0]
-    astray = replace(again, values=again.values * np.nan)
+    astray = replace(again, step=fit.STEPS[2], values=again.values * np.nan)
     assert halves([motion], again, [again, astray]).step == fit.STEPS[1]
 
 
