@@ -17,7 +17,9 @@ class Reading(NamedTuple):  # a frozen dataclass takes three times as long to ma
     | dvl      | (6,) u, v, w over ground, then through the water [m/s]; NaN where that track is lost     |
     | gyro     | (3,) p, q, r [rad/s]                                                                     |
     | range    | (1,) slant range to a beacon [m]                                                         |
-    | fix      | (2,) north, east [m]                                                                     |
+    | fix, gps | (2,) north, east [m]                                                                     |
+    | altimeter| (1,) range to the sea floor along the hull's downward axis [m]                           |
+    | imu      | (6,) p, q, r [rad/s], specific force x, y, z [m/s2]: means since the last reading        |
     | imaging_ | (2,) mean intensity, largest by the mean; or, if they are logged, (beams, bins) levels   |
     | sonar    | in half decibels; `image` has the intensities                                            |
     """

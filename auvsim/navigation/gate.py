@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 
 from auvsim.base.reading import Reading
+from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.depth import DepthSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.feedback import FeedbackSettings
 from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
+from auvsim.sensors.imu import ImuSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Actuation
 from estimators.core.screening import Limits, Screen
@@ -30,6 +33,7 @@ FASTEST, SPEED, JOLT = (
 )  # of a range [m/s]; largest speed [m/s], its fastest change, bumps included [m/s2]
 FARTHEST = 1e6  # position from the datum [m]
 RATE = 10.0  # largest rate of turn [rad/s]
+SHOCK = 200.0  # largest specific force, bumps included [m/s2]
 
 
 class Gate:
@@ -50,6 +54,7 @@ class Gate:
             for name, settings in sensors.items()
             if (limits := _limits(settings, actuation, frozen))
         }
+        self._dvls = {name for name, settings in sensors.items() if isinstance(settings, DvlSettings)}
         self.refused: dict[str, int] = {}  # in a row, by sensor
 
     def judge(self, reading: Reading) -> str:
@@ -62,7 +67,7 @@ class Gate:
         values = reading.value.tolist()
         stamp, reason = reading.stamp, ""
         pairs = zip(screens, values, strict=False)
-        if len(values) == 6:  # a DVL's two tracks, either of which may be lost
+        if reading.sensor in self._dvls:  # two tracks, either of which may be lost
             lost = np.repeat(np.isnan(reading.value.reshape(2, 3)).all(axis=1), 3).tolist()
             pairs = ((screen, value) for (screen, value), away in zip(pairs, lost, strict=False) if not away)
         for screen, value in pairs:  # each of them, since each remembers what it was shown
@@ -105,7 +110,11 @@ def _limits(settings: Any, actuation: Actuation, frozen: bool) -> list[Limits]:
             return [noisy(sigma, -SPEED, SPEED, JOLT) for sigma in sigmas]
         case RangeSettings():
             return [noisy(settings.noise, -SURE * settings.noise, 1.1 * settings.maximum, FASTEST)]
-        case FixSettings():
+        case AltimeterSettings():
+            return [noisy(settings.noise, -SURE * settings.noise, 1.2 * settings.maximum_range, math.inf)]
+        case ImuSettings():
+            return [Limits(low=-RATE, high=RATE)] * 3 + [Limits(low=-SHOCK, high=SHOCK)] * 3
+        case FixSettings() | GpsSettings():
             return [Limits(low=-FARTHEST, high=FARTHEST)] * 2
         case FeedbackSettings():
             return [Limits(low=2.0 * low, high=2.0 * high) for low, high in actuation.limits.tolist()]

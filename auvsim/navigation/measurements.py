@@ -11,6 +11,7 @@ from auvsim.base.reading import Reading
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.types import Measurement
@@ -62,6 +63,10 @@ def measurements(
             yield _measurement(RANGE, reading, value, settings.noise, source=reading.sensor, parameters=place)
         case FixSettings():
             yield _measurement(FIX, reading, value[:2], settings.noise, settings.noise)
+        case GpsSettings():
+            # An error that stays for a while weighs as white noise of its spectral density.
+            sigma = math.hypot(settings.noise, settings.wander * math.sqrt(2.0 * settings.wander_time * settings.rate))
+            yield _measurement(FIX, reading, value, sigma, sigma)
 
 
 def _measurement(kind: str, reading: Reading, value: Array, *sigmas: float, **more: Any) -> Measurement:

@@ -1,8 +1,9 @@
 """A Doppler velocity log: velocity over ground (bottom track) and through a layer of water below (water track).
 
 It is taken as measured at the body's origin: the lever arm of its mounting, yaw rate times about half a metre, is
-known on a real vehicle, which takes it out with its gyro. Altitude is the vertical distance to the sea floor
-below the body's origin.
+known on a real vehicle, which takes it out with its gyro. Four beams, 45 deg off the bow and the stern, meet the sea
+floor as the hull lies and the floor rises; bottom track needs three of them. The floor is at rest, so its slope does
+not change what a beam shows.
 """
 
 import math
@@ -12,11 +13,12 @@ import numpy as np
 from numpy.random import Generator
 from pydantic import Field, model_validator
 
-from auvsim.base.frames import rotation
+from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
 from auvsim.base.settings import Settings
 from auvsim.data.variables import Variable
 from auvsim.physics.truth import Truth
+from auvsim.sensors.floor_rays import slant_range
 from auvsim.sensors.sensor import Sensor, Surroundings
 
 Vector = tuple[float, float, float]
@@ -44,8 +46,20 @@ class DvlSettings(Settings):
     misalignment_deg: float = Field(
         default=0.3, ge=0.0, description="error of its mounting in heading, of a trial, sd [deg]"
     )
-    minimum_altitude: float = Field(default=0.5, ge=0.0, description="altitude below which it measures nothing [m]")
-    maximum_altitude: float = Field(default=65.0, gt=0.0, description="altitude above which bottom track is lost [m]")
+    beam_tilt_deg: float = Field(default=30.0, ge=10.0, le=45.0, description="of the four beams off its axis [deg]")
+    minimum_altitude: float = Field(
+        default=0.5, ge=0.0, description="altitude, by a beam's range, below which that measures nothing [m]"
+    )
+    maximum_altitude: float = Field(
+        default=65.0, gt=0.0, description="altitude, by a beam's range, above which that sees no bottom [m]"
+    )
+    dropout_at_maximum: float = Field(
+        default=0.0,
+        ge=0.0,
+        le=1.0,
+        description="share of bottom tracks lost besides at the maximum altitude; it falls with the altitude's fourth "
+        "power [-]",
+    )
     water_layer: tuple[float, float] = Field(
         default=(2.0, 8.0), description="layer of the water track: near and far edge below the vehicle [m]"
     )
@@ -91,22 +105,52 @@ class Dvl(Sensor):
         # Seen from a transducer that is turned to starboard, the same velocity is turned to port.
         self._errors = self.scale * rotation(0.0, 0.0, self.misalignment).T
         self._below = np.array((0.0, 0.0, 0.5 * sum(settings.water_layer)))
+        tilt = math.radians(settings.beam_tilt_deg)
+        self._beams, self._along = beams(tilt), math.cos(tilt)
+        self._three = [three_beams(self._beams, lost) for lost in range(4)]
 
     def measure(self, truth: Truth, world: Surroundings) -> Reading:
         """Pings once and measures both tracks."""
         settings = self.settings
-        noise = self.biases + self._sigmas * self._noise.normals(6)
-        chances = self._noise.uniforms(2)
+        draws, chances = np.array(self._noise.normals(6)), self._noise.uniforms(2)
+        turn = rotation(*truth.attitude.tolist())
+        altitudes = [self._along * slant_range(world.terrain, truth.position, beam) for beam in self._beams @ turn.T]
+        seen = [settings.minimum_altitude <= altitude <= settings.maximum_altitude for altitude in altitudes]
+        if sum(seen) == 3:
+            draws[:3] = self._three[seen.index(False)] @ draws[:3]
         ground = truth.nu[:3]
         water = world.current.evaluate(truth.time, truth.position + self._below).velocity
-        through = ground - water @ rotation(*truth.attitude.tolist())
-        value = np.concatenate((self._errors @ ground, self._errors @ through)) + noise
+        through = ground - water @ turn
+        value = np.concatenate((self._errors @ ground, self._errors @ through)) + (self.biases + self._sigmas * draws)
+        if sum(seen) < 3 or chances[0] < self._lost(altitudes, seen):
+            value[:3] = math.nan
         north, east, down = truth.position.tolist()
         altitude = world.terrain.depth(north, east) - down
-        bottom = settings.minimum_altitude <= altitude <= settings.maximum_altitude
         layer = altitude >= settings.minimum_altitude and USABLE * altitude >= settings.water_layer[1]
-        if not bottom or chances[0] < settings.dropout_probability:
-            value[:3] = math.nan
         if not layer or chances[1] < settings.dropout_probability:
             value[3:] = math.nan
         return self._reading(truth.time, value)
+
+    def _lost(self, altitudes: list[float], seen: list[bool]) -> float:
+        """Probability that a bottom track is lost, at altitudes by the beams [m] that see the bottom."""
+        settings = self.settings
+        mean = sum(a for a, sees in zip(altitudes, seen, strict=True) if sees) / sum(seen)
+        share = settings.dropout_at_maximum * (mean / settings.maximum_altitude) ** 4
+        return settings.dropout_probability + (1.0 - settings.dropout_probability) * share
+
+
+def beams(tilt: float) -> Array:
+    """Unit vectors (4, 3) of the beams in the body's axes, 45 deg off bow and stern, tilted off the downward axis."""
+    aside = math.sin(tilt) * math.sqrt(0.5)
+    return np.array([(x * aside, y * aside, math.cos(tilt)) for x, y in ((1, 1), (1, -1), (-1, -1), (-1, 1))])
+
+
+def three_beams(all_four: Array, lost: int) -> Array:
+    """Matrix (3, 3) that makes noise of three beams from white noise: unit deviations are those of all four.
+
+    Each beam errs alike and by itself; a velocity is the least-squares solution of those that see the bottom.
+    """
+    of_four = np.linalg.inv(all_four.T @ all_four)
+    rest = np.delete(all_four, lost, axis=0)
+    deviations = np.sqrt(np.diagonal(of_four))
+    return np.linalg.cholesky(np.linalg.inv(rest.T @ rest) / np.outer(deviations, deviations))

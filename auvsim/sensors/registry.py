@@ -8,19 +8,23 @@ from numpy.random import Generator
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
 from auvsim.data.variables import Variable
+from auvsim.sensors.altimeter import Altimeter
 from auvsim.sensors.compass import Compass
 from auvsim.sensors.depth import Depth
 from auvsim.sensors.dvl import Dvl
 from auvsim.sensors.feedback import Feedback
 from auvsim.sensors.fix import Fix
+from auvsim.sensors.gps import Gps
 from auvsim.sensors.gyro import Gyro
 from auvsim.sensors.imaging_sonar import ImagingSonar
+from auvsim.sensors.imu import Imu
 from auvsim.sensors.range import Range
 from auvsim.sensors.sensor import Sensor
 from auvsim.vehicles.library import Vehicle
 
 STANDARD: tuple[type[Sensor], ...] = (Compass, Depth, Feedback, Dvl, Gyro)  # every vehicle has settings for them
-SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, Range, Fix, ImagingSonar)}
+OTHERS: tuple[type[Sensor], ...] = (Range, Fix, ImagingSonar, Altimeter, Gps, Imu)
+SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, *OTHERS)}
 
 
 def find(kind: str) -> Callable[..., Sensor]:

@@ -17,7 +17,7 @@ from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Models
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Search, match
-from estimators.map_path.odometry import POSE, OdometryNoise
+from estimators.map_path.odometry import OdometryNoise
 from estimators.map_path.poses import between, between_jacobians
 
 NIS_GATE = 0.9999  # a match outside is refused
@@ -35,15 +35,21 @@ class Window:
 class WindowState(NamedTuple):
     """What a node keeps."""
 
-    whole: Gaussian  # of the five states and the poses of the window's frames, the latest last (5 + 3 k)
+    whole: Gaussian  # of the vehicle's states and the poses of the window's frames, the latest last (n + 3 k)
     frames: tuple[Prepared, ...] = ()  # of the window
     outliers: int = 0
     verdicts: Verdicts = ()
 
     @property
+    def size(self) -> int:
+        """Number n of the vehicle's states."""
+        return self.whole.mean.size - 3 * len(self.frames)
+
+    @property
     def belief(self) -> Gaussian:
-        """Of north, east, heading and the biases of speed and turn rate."""
-        return Gaussian(mean=self.whole.mean[:5], covariance=self.whole.covariance[:5, :5])
+        """Of the vehicle's states, of which the first are north, east and heading."""
+        n = self.size
+        return Gaussian(mean=self.whole.mean[:n], covariance=self.whole.covariance[:n, :n])
 
 
 class WindowFilter:
@@ -81,14 +87,7 @@ class WindowFilter:
 
     def predict(self, state: WindowState, u: Input, duration: float) -> WindowState:
         """State after `duration` [s]."""
-        mean, covariance = state.whole.mean.copy(), state.whole.covariance.copy()
-        F = np.ascontiguousarray(self.process.jacobian(mean[:5], u, duration))
-        predicted = ekf.predict(state.belief, self.process, u, duration)
-        mean[:5] = predicted.mean
-        covariance[:5, 5:] = F @ covariance[:5, 5:]
-        covariance[5:, :5] = covariance[:5, 5:].T
-        covariance[:5, :5] = predicted.covariance
-        return state._replace(whole=Gaussian(mean=mean, covariance=covariance), verdicts=())
+        return state._replace(whole=predicted(state.whole, state.size, self.process, u, duration), verdicts=())
 
     def correct(self, state: WindowState, node_time: float, measurements: Sequence[Measurement]) -> WindowState:
         """State after a node's frames; those that cannot be used are refused by name."""
@@ -111,39 +110,88 @@ class WindowFilter:
 
     def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float]:
         """State with a frame matched against the window, or why it was not, and the match's NIS."""
-        count = len(state.frames)
-        chosen = [count - lag for lag in self._window.lags if lag <= count]
-        pose, clones = state.whole.mean[POSE], state.whole.mean[5:].reshape(-1, 3)[chosen]
-        jacobians = [_in_later_axes(clone, pose) for clone in clones]
-        P, latest = state.whole.covariance, 5 + 3 * chosen[0]
-        places = [0, 1, 2, latest, latest + 1, latest + 2]
-        both = np.hstack((jacobians[0][1], jacobians[0][0]))
-        prior = both @ P[np.ix_(places, places)] @ both.T + 1e-8 * np.eye(3)
+        chosen = [len(state.frames) - lag for lag in self._window.lags if lag <= len(state.frames)]
         earlier = [state.frames[k] for k in chosen]
-        found = match(self.matcher, frame, earlier, between(clones, pose), prior, self._search)
+        relation = Relation.of_pose(state.whole, state.size, [state.size + 3 * k for k in chosen])
+        prior = relation.covariance(0) + 1e-8 * np.eye(3)
+        found = match(self.matcher, frame, earlier, relation.relatives, prior, self._search)
         if isinstance(found, str):
             return state, found, np.nan
-        H = np.zeros((3, state.whole.mean.size))
-        for k, (by_clone, by_pose), weight in zip(chosen, jacobians, found.weights, strict=True):
-            H[:, POSE] += weight * by_pose
-            H[:, 5 + 3 * k : 8 + 3 * k] = weight * by_clone
+        H = relation.jacobian(found.weights)
         limit = chi_square(NIS_GATE, 3)
         whole, innovation = ekf.correct_linear(state.whole, H, found.offset, found.covariance, limit)
         if not innovation.accepted:
             return state._replace(outliers=state.outliers + 1), OUTLIER, innovation.nis
-        angles = (2, *range(7, whole.mean.size, 3))
-        whole = Gaussian(mean=wrapped(whole.mean, angles), covariance=whole.covariance)
-        return state._replace(whole=whole), "", innovation.nis
+        return state._replace(whole=with_angles(whole, state.size)), "", innovation.nis
 
     def _with(self, state: WindowState, frame: Prepared) -> WindowState:
         """State with the vehicle's pose cloned as that of a frame, and without the oldest frame too many."""
-        n = state.whole.mean.size
-        rows = np.concatenate((np.arange(n), np.arange(3)))
-        frames = (*state.frames, frame)
+        n, frames = state.size, (*state.frames, frame)
+        rows = np.concatenate((np.arange(state.whole.mean.size), np.arange(3)))
         if len(frames) > self._window.kept:
-            frames, rows = frames[1:], np.concatenate((rows[:5], rows[8:]))
-        whole = Gaussian(mean=state.whole.mean[rows], covariance=state.whole.covariance[np.ix_(rows, rows)])
-        return state._replace(whole=whole, frames=frames)
+            frames, rows = frames[1:], np.concatenate((rows[:n], rows[n + 3 :]))
+        return state._replace(whole=rearranged(state.whole, rows), frames=frames)
+
+
+class Relation(NamedTuple):
+    """A pose in a state relative to poses of earlier frames in it, and its derivatives in the later pose's axes."""
+
+    whole: Gaussian
+    later: int  # where it begins in the state
+    earlier: Sequence[int]  # where those begin
+    relatives: Array  # (k, 3)
+    derivatives: Sequence[tuple[Array, Array]]  # (3, 3) by the earlier and by the later pose
+
+    @classmethod
+    def of_pose(cls, whole: Gaussian, size: int, earlier: Sequence[int], later: int = 0) -> "Relation":
+        """Of the vehicle's pose, or of that of a frame.
+
+        Args:
+            whole: of the vehicle's states and of frames.
+            size: number of the vehicle's states.
+            earlier: where the poses of the earlier frames begin.
+            later: where the later pose begins.
+        """
+        pose, clones = whole.mean[later : later + 3], np.array([whole.mean[k : k + 3] for k in earlier])
+        return cls(whole, later, earlier, between(clones, pose), [_in_later_axes(clone, pose) for clone in clones])
+
+    def covariance(self, which: int) -> Array:
+        """Covariance (3, 3) of the pose relative to one of the earlier ones."""
+        places = [self.later + i for i in range(3)] + [self.earlier[which] + i for i in range(3)]
+        both = np.hstack(self.derivatives[which][::-1])
+        return both @ self.whole.covariance[np.ix_(places, places)] @ both.T
+
+    def jacobian(self, weights: Array) -> Array:
+        """Derivative (3, n + 3 k) of the mean of the relative poses with some weights (k,) by the whole state."""
+        H = np.zeros((3, self.whole.mean.size))
+        for place, (by_earlier, by_later), weight in zip(self.earlier, self.derivatives, weights, strict=True):
+            H[:, self.later : self.later + 3] += weight * by_later
+            H[:, place : place + 3] += weight * by_earlier
+        return H
+
+
+def predicted(whole: Gaussian, size: int, process: ProcessModel, u: Input, duration: float) -> Gaussian:
+    """A belief of the vehicle's states and of frames' poses after `duration` [s]: the frames stay where they are."""
+    mean, covariance = whole.mean.copy(), whole.covariance.copy()
+    F = np.ascontiguousarray(process.jacobian(mean[:size], u, duration))
+    belief = Gaussian(mean=mean[:size], covariance=whole.covariance[:size, :size])
+    moved = ekf.predict(belief, process, u, duration)
+    mean[:size] = moved.mean
+    covariance[:size, size:] = F @ covariance[:size, size:]
+    covariance[size:, :size] = covariance[:size, size:].T
+    covariance[:size, :size] = moved.covariance
+    return Gaussian(mean=mean, covariance=covariance)
+
+
+def with_angles(whole: Gaussian, size: int) -> Gaussian:
+    """The same with all headings in (-pi, pi]."""
+    angles = (2, *range(size + 2, whole.mean.size, 3))
+    return Gaussian(mean=wrapped(whole.mean, angles), covariance=whole.covariance)
+
+
+def rearranged(whole: Gaussian, rows: np.ndarray) -> Gaussian:
+    """A belief of some components of another, in any order, any of them more than once."""
+    return Gaussian(mean=whole.mean[rows], covariance=whole.covariance[np.ix_(rows, rows)])
 
 
 def _in_later_axes(earlier: Array, later: Array) -> tuple[Array, Array]:

@@ -14,10 +14,10 @@ from auvsim.base.frames import euler_to_quaternion
 from auvsim.base.randomness import stream
 from auvsim.base.reading import Reading
 from auvsim.physics.truth import Truth
-from auvsim.sensors.dvl import Dvl, DvlSettings
+from auvsim.sensors.dvl import Dvl, DvlSettings, beams, three_beams
 from auvsim.water.currents import CurrentField, build_current
 from auvsim.water.settings import ShearPoint, ShearSettings, UniformSettings
-from auvsim.water.terrain import FlatFloor
+from auvsim.water.terrain import FlatFloor, SlopedFloor
 
 EXACT: dict[str, Any] = {
     "bottom_noise": (0.0, 0.0, 0.0),
@@ -37,14 +37,14 @@ def field(settings: Any = WATER) -> CurrentField:
     return build_current(settings, stream(0, 0, "current"), 100.0)
 
 
-def truth(depth: float = 10.0, current: CurrentField | None = None) -> Truth:
+def truth(depth: float = 10.0, current: CurrentField | None = None, attitude: tuple = ATTITUDE) -> Truth:
     """A vehicle that pitches, rolls and turns at a depth."""
     position = np.array([3.0, -4.0, depth])
     return Truth(
         time=7.0,
         position=position,
-        quaternion=euler_to_quaternion(*ATTITUDE),
-        attitude=np.array(ATTITUDE),
+        quaternion=euler_to_quaternion(*attitude),
+        attitude=np.array(attitude),
         nu=np.array(NU),
         current=(current or field()).evaluate(7.0, position).velocity,
         actuators=np.array((0.0, 0.0, 0.0, 0.0, 100.0)),
@@ -145,9 +145,59 @@ def test_water_track_is_relative_to_the_layer_below() -> None:
     ],
 )
 def test_limits_of_altitude(altitude: float, bottom: bool, water: bool) -> None:
-    """Bottom from 0.5 to 65 m; water while the layer's far edge, 8 m, is within 80 % of the altitude."""
-    value = log(floor=100.0, **EXACT).measure(truth(100.0 - altitude)).value
+    """Bottom from 0.5 to 65 m, hull level; water while the layer's far edge, 8 m, is within 80 % of the altitude."""
+    value = log(floor=100.0, **EXACT).measure(truth(100.0 - altitude, attitude=(0.0, 0.0, 2.3))).value
     assert np.isfinite(value).tolist() == [bottom] * 3 + [water] * 3
+
+
+@pytest.mark.parametrize(("roll", "bottom"), [(0.1, True), (0.25, True), (0.3, False), (-0.3, False)])
+def test_tilt_lengthens_the_beams_of_one_side(roll: float, bottom: bool) -> None:
+    """At 55 of 65 m: a beam 30 deg off the axis has 55 cos 30 / c m, c its downward part by scipy; two are too many."""
+    turn = Rotation.from_euler("ZYX", (2.3, 0.0, roll))
+    downward = turn.apply(beams(math.radians(30.0)))[:, 2]
+    assert (55.0 * math.cos(math.radians(30.0)) / downward <= 65.0).sum() == (4 if bottom else 2)
+    value = log(floor=100.0, **EXACT).measure(truth(45.0, attitude=(roll, 0.0, 2.3))).value
+    assert np.isfinite(value[:3]).all() == bottom
+
+
+def test_a_slope_takes_one_beam_and_its_noise_is_that_of_three() -> None:
+    """Down a slope to the north-east one beam is too long; noise of least squares of the other three, by 20000 pings.
+
+    The least squares are of three beams drawn one by one here, each with the noise that makes the settings' noise of
+    all four.
+    """
+    noise, tilt = (0.01, 0.01, 0.01 * math.tan(math.radians(30.0)) / math.sqrt(2.0)), math.radians(30.0)
+    dvl = log(**{**EXACT, "bottom_noise": noise}, maximum_altitude=12.0)
+    dvl.around = Around(field(), SlopedFloor(20.0, 0.3, 0.1))
+    level = truth(10.0, attitude=(0.0, 0.0, 0.0))
+    values = np.array([dvl.measure(level).value[:3] for _ in range(COUNT)]) - NU[:3]
+    below = 20.0 + 0.3 * 3.0 + 0.1 * -4.0 - 10.0
+    lengths = np.array([below / (math.cos(tilt) - 0.3 * b[0] - 0.1 * b[1]) for b in beams(tilt)])
+    seen = math.cos(tilt) * lengths <= 12.0
+    assert sorted(seen) == [False, True, True, True]
+    rest = beams(tilt)[seen]
+    of_beam = 0.01 * math.sin(tilt) * math.sqrt(2.0)
+    drawn = np.random.default_rng(3).normal(0.0, of_beam, (COUNT, 3)) @ np.linalg.pinv(rest).T
+    np.testing.assert_allclose(np.cov(values.T), np.cov(drawn.T), rtol=0.1, atol=4e-6)
+    assert values[:, 0].std() > 1.2 * noise[0]  # worse than of all four
+
+
+def test_three_beams_err_as_their_least_squares() -> None:
+    """Against the covariance of three beams, by whichever is lost; unit deviations are those of all four."""
+    four = beams(0.6)
+    units = np.sqrt(np.diagonal(np.linalg.inv(four.T @ four)))
+    for lost in range(4):
+        rest = np.delete(four, lost, axis=0)
+        made = units[:, None] * three_beams(four, lost)
+        np.testing.assert_allclose(made @ made.T, np.linalg.inv(rest.T @ rest), atol=1e-12)
+
+
+def test_bottom_is_lost_more_often_high_above_it() -> None:
+    """A share of 0.8 at the maximum, by the fourth power: 0.8 * 0.8^4 at 52 of 65 m, inside its binomial interval."""
+    dvl = log(floor=100.0, **EXACT, dropout_at_maximum=0.8)
+    lost = sum(math.isnan(dvl.measure(truth(48.0, attitude=(0.0, 0.0, 2.3))).value[0]) for _ in range(3000))
+    low, high = binom.ppf([1e-5, 1 - 1e-5], 3000, 0.8 * 0.8**4)
+    assert low <= lost <= high
 
 
 def test_dropouts_come_as_often_as_set_on_each_track() -> None:
