@@ -57,6 +57,7 @@ class MissionSetup:
     structures: Mapping[str, Place]  # all that are charted, by name
     usbl: bool = True  # whether a dock reports where it lies
     ranges: tuple[str, ...] = ()  # names of the sensors that measure ranges to beacons
+    altimeters: tuple[str, ...] = ()  # names of those that measure the range to the sea floor
 
 
 class Metric(NamedTuple):

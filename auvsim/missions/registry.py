@@ -18,6 +18,7 @@ from auvsim.missions.hovering.hold import Hold, HoldSettings
 from auvsim.missions.manoeuvres.mission import Manoeuvre
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.missions.mission import Mission, MissionSetup
+from auvsim.missions.survey.mission import Survey, SurveySettings
 from auvsim.missions.track.mission import Track, TrackSettings
 
 
@@ -32,6 +33,7 @@ MissionSettings = Annotated[
     | Annotated[HoldSettings, Tag("HoldSettings")]
     | Annotated[HoveringDockingSettings, Tag("HoveringDockingSettings")]
     | Annotated[FormationSettings, Tag("FormationSettings")]
+    | Annotated[SurveySettings, Tag("SurveySettings")]
     | Annotated[OwnMission, Tag("OwnMission")],
     Discriminator(
         tag_by_kind(
@@ -41,6 +43,7 @@ MissionSettings = Annotated[
             HoldSettings,
             HoveringDockingSettings,
             FormationSettings,
+            SurveySettings,
             OwnMission,
         )
     ),
@@ -51,6 +54,7 @@ MISSIONS: dict[str, type[Mission]] = {
     "track": Track,
     "hold": Hold,
     "formation": Formation,
+    "survey": Survey,
     "hovering_docking": HoveringDocking,
 }
 

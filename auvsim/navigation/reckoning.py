@@ -15,19 +15,21 @@ from auvsim.navigation.measurements import FIX, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.navigation.over_history import OverHistory
 from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter
 from estimators.core.history import Node
 from estimators.core.models import sensors
-from estimators.core.models.motion import constant_velocity, with_error
+from estimators.core.models.motion import Motion, constant_velocity, with_error
 from estimators.core.models.process import MotionProcess
-from estimators.core.types import Gaussian, Measurement
+from estimators.core.types import Gaussian, Measurement, Models
 from estimators.docking.aids import BOTTOM, GYRO, RANGE
 from estimators.docking.sensors import COMPASS
 from estimators.docking.usbl import UsblFix, UsblModel
 
 BIASES = {"compass_bias": "rad", "gyro_bias": "rad/s"}
+GYRO_WALK = 1e-12  # of a gyro's bias [rad2/s3]
 SPEED, TURNING = 1.0, 0.1  # what is not known at first: velocities [m/s], yaw rate [rad/s]
 GYRO_BIAS, UNKNOWN = 1e-3, 50.0  # deviations at the start: of a gyro's bias [rad/s], of a position by ranges alone [m]
 
@@ -41,13 +43,13 @@ class ReckoningNavigator(OverHistory):
 
     def __init__(self, setup: NavigatorSetup) -> None:
         s = setup.settings
-        motion = constant_velocity(turning=True)
-        for name, unit in BIASES.items():
-            motion = with_error(motion, name, unit)
+        motion = self._motion()
         self.states: Mapping[str, str] = dict(motion.space.units)
         self._space, self._sensors = motion.space, dict(setup.sensors)
         self._compass_bias = math.radians(s.compass_error_deg)
-        self._located = (setup.dock is not None and setup.usbl.enabled) or bool(of_kind(self._sensors, FixSettings))
+        self._located = (setup.dock is not None and setup.usbl.enabled) or any(
+            of_kind(self._sensors, kind) for kind in (FixSettings, GpsSettings)
+        )
         self._ranged = bool(of_kind(self._sensors, RangeSettings))
         self._dock = np.zeros(2) if setup.dock is None else setup.dock.position[:2]
         self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))
@@ -59,7 +61,7 @@ class ReckoningNavigator(OverHistory):
                 "surge": s.acceleration,
                 "sway": s.acceleration,
                 "yaw_rate": s.yaw_acceleration,
-                "gyro_bias": 1e-12,
+                "gyro_bias": self._gyro_walk(setup),
             },
         )
         models = {
@@ -69,9 +71,34 @@ class ReckoningNavigator(OverHistory):
             FIX: sensors.fix(motion),
             RANGE: sensors.range_to(motion),
         }
-        filter_ = ModelFilter(process, models, self._start, gates=0.9999)
-        self._estimator = Estimator(filter_, step=setup.period)
+        self._estimator = self._estimator_of(motion, process, models, setup)
         self.reset()
+
+    def _motion(self) -> Motion:
+        """How the vehicle moves."""
+        motion = constant_velocity(turning=True)
+        for name, unit in BIASES.items():
+            motion = with_error(motion, name, unit)
+        return motion
+
+    def _gyro_walk(self, setup: NavigatorSetup) -> float:
+        """Process noise of the gyro's bias [rad2/s3]."""
+        return GYRO_WALK
+
+    def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
+        """The filter behind its delay buffer."""
+        return Estimator(ModelFilter(process, models, self._start, gates=0.9999), step=setup.period)
+
+    def _known(self) -> dict[str, float]:
+        """Deviations at the start of what no reading shows at once."""
+        return {
+            "surge": SPEED, "sway": SPEED, "yaw_rate": TURNING, "compass_bias": self._compass_bias,
+            "gyro_bias": GYRO_BIAS,
+        }  # fmt: skip
+
+    def _more(self) -> list[Measurement]:
+        """What else there is to tell since the last update."""
+        return []
 
     def reset(self) -> None:
         """Forgets everything."""
@@ -91,7 +118,7 @@ class ReckoningNavigator(OverHistory):
                 found.append(self._fix(reading))
             elif reading.sensor in self._sensors:
                 found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
-        result = self._estimator.tick(time, (), found)
+        result = self._estimator.tick(time, (), [*found, *self._more()])
         n = len(self._space)
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
         mean = belief.mean
@@ -133,9 +160,10 @@ class ReckoningNavigator(OverHistory):
         deviation = UNKNOWN if self._ranged else 0.0
         known = {
             "heading": math.hypot(self._compass_bias, math.sqrt(earlier[-1].covariance.item())),
-            "surge": SPEED, "sway": SPEED, "yaw_rate": TURNING, "compass_bias": self._compass_bias,
-            "gyro_bias": GYRO_BIAS, "north": deviation, "east": deviation,
-        }  # fmt: skip
+            "north": deviation,
+            "east": deviation,
+            **self._known(),
+        }
         belief = self._space.belief({"heading": float(earlier[-1].value[0])}, known)
         mean, covariance = belief.mean, belief.covariance
         psi, bias = self._space.index("heading"), self._space.index("compass_bias")

@@ -7,7 +7,7 @@ from typing import Any
 
 from auvsim.base import plugins
 from auvsim.base.errors import AuvsimError, InputError
-from auvsim.navigation import docking, following, motion_radius, path_prediction, reckoning
+from auvsim.navigation import docking, following, motion_radius, path_prediction, reckoning, sonar
 from auvsim.navigation.navigator import Navigator, NavigatorFactory, NavigatorSetup
 
 _SHIPPED: tuple[NavigatorFactory, ...] = (
@@ -26,6 +26,7 @@ ESTIMATORS: dict[str, NavigatorFactory] = {  # of docking
 }
 GENERAL: dict[str, NavigatorFactory] = {  # that need no dock
     "dead_reckoning": reckoning.dead_reckoning,
+    "sonar": sonar.sonar_reckoning,
     "range_ekf": following.range_ekf,
     "motion_radius": motion_radius.motion_radius,
     "path_prediction": path_prediction.path_prediction,

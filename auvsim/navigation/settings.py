@@ -100,6 +100,16 @@ class ReckoningSettings(_Assumed):
     dock_heading_deg: float = Field(default=0.3, ge=0, description="error of the dock's compass it assumes [deg]")
 
 
+class SonarSettings(ReckoningSettings):
+    """Dead reckoning beside an imaging sonar, whose frames are matched with earlier ones."""
+
+    kind: Literal["sonar"] = "sonar"  # pyright: ignore[reportIncompatibleVariableOverride]
+    match: bool = Field(default=True, description="whether frames are matched; without, it is dead reckoning")
+    closures: bool = Field(default=True, description="whether loops are closed between lanes")
+    keyframes: int = Field(default=6, ge=1, le=1000, description="frames from one that is kept for that to the next")
+    keep: float = Field(default=10.0, gt=0, description="age up to which measurements are used [s]")
+
+
 class FollowerSettings(_Assumed):
     """A filter of a follower that hears where others are, and ranges to them by their packets."""
 
@@ -162,6 +172,7 @@ EstimatorSettings = Annotated[
     | Annotated[InteractingSettings, Tag("InteractingSettings")]
     | Annotated[PaperSettings, Tag("PaperSettings")]
     | Annotated[ReckoningSettings, Tag("ReckoningSettings")]
+    | Annotated[SonarSettings, Tag("SonarSettings")]
     | Annotated[FollowerSettings, Tag("FollowerSettings")]
     | Annotated[MotionRadiusSettings, Tag("MotionRadiusSettings")]
     | Annotated[PathPredictionSettings, Tag("PathPredictionSettings")]
@@ -173,6 +184,7 @@ EstimatorSettings = Annotated[
             InteractingSettings,
             PaperSettings,
             ReckoningSettings,
+            SonarSettings,
             FollowerSettings,
             MotionRadiusSettings,
             PathPredictionSettings,

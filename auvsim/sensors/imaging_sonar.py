@@ -98,12 +98,10 @@ class ImagingSonar(Sensor):
 
     def __init__(self, settings: ImagingSonarSettings, generator: Generator, **of_instance: Any) -> None:
         super().__init__(settings, generator, **of_instance)
+        self.bearings, self.ranges = geometry(settings)
         settings = settings.model_copy(update=PRESETS.get(settings.preset, {}))
         self.settings, self._generator = settings, generator
-        half = 0.5 * math.radians(settings.sector_deg)
-        self.bearings: Array = np.linspace(-half, half, settings.beams)
         self.width = (settings.maximum_range - settings.minimum_range) / settings.bins  # of a bin [m]
-        self.ranges: Array = settings.minimum_range + self.width * (np.arange(settings.bins) + 0.5)
         spacing = float(self.bearings[1] - self.bearings[0])
         self._weights = sonar_echo.pattern(spacing, math.radians(settings.beam_width_deg))
         self._high = math.radians(settings.elevation_deg)
@@ -196,6 +194,15 @@ class ImagingSonar(Sensor):
         share *= self._beam[0] * self._high / ELEVATIONS * OBJECT_ECHO * facing[met]
         np.add.at(echoes, (b, ((distance - self.settings.minimum_range) / self.width).astype(int)), share)
         return hits, echoes
+
+
+def geometry(settings: ImagingSonarSettings) -> tuple[Array, Array]:
+    """Bearings (beams,) [rad] and ranges (bins,) [m] of a sonar's samples."""
+    settings = settings.model_copy(update=PRESETS.get(settings.preset, {}))
+    half = 0.5 * math.radians(settings.sector_deg)
+    width = (settings.maximum_range - settings.minimum_range) / settings.bins
+    ranges = settings.minimum_range + width * (np.arange(settings.bins) + 0.5)
+    return np.linspace(-half, half, settings.beams), ranges
 
 
 def absorption(frequency: float) -> float:

@@ -25,6 +25,7 @@ from auvsim.navigation.navigator import Navigator
 from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
+from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.sensors.sensor import Surroundings
 from auvsim.simulation import parts
@@ -103,6 +104,7 @@ class Agent:
                 structures=places,
                 usbl=self.serves,
                 ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
+                altimeters=tuple(of_kind(dict(on_board(settings.sensors)), AltimeterSettings)),
             ),
         )
         setup = navigator_setup(plan, name, vehicle)

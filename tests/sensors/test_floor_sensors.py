@@ -17,8 +17,8 @@ from auvsim.sensors.altimeter import Altimeter, AltimeterSettings
 from auvsim.sensors.floor_rays import slant_range
 from auvsim.sensors.gps import Gps, GpsSettings
 from auvsim.sensors.imu import Imu, ImuSettings
-from auvsim.water.seabed import SeabedSettings, make
-from auvsim.water.terrain import SlopedFloor
+from auvsim.water.seabed import SeabedSettings
+from auvsim.water.terrain import SlopedFloor, build_terrain
 from auvsim.water.terrain_grid import GriddedFloor
 
 SLOPE = SlopedFloor(20.0, 0.2, -0.1)
@@ -48,7 +48,7 @@ def test_a_ray_meets_a_plane_where_geometry_says() -> None:
 
 def test_a_ray_ends_on_a_rough_floor() -> None:
     """Where a ray over a generated floor settles, its end is on it to the millimetres of the search."""
-    floor = make(SeabedSettings(extent=40.0, spacing=0.25), 20.0)
+    floor = build_terrain(SeabedSettings(extent=40.0, spacing=0.25), 20.0)
     assert isinstance(floor, GriddedFloor)
     rng, found = np.random.default_rng(2), 0
     for _ in range(200):
@@ -124,7 +124,7 @@ def test_an_antenna_is_where_it_is_on_the_hull() -> None:
 def test_errors_of_gps_are_white_and_slow() -> None:
     """Over trials the first reading errs by both parts; from one second to the next only the white part is new."""
     at = truth(0.0, (3.0, -4.0, 0.1), (0.0, 0.0, 0.3))
-    settings = {"first_fix": 0.0, "noise": 0.5, "wander": 3.0, "wander_time": 50.0}
+    settings: dict[str, Any] = {"first_fix": 0.0, "noise": 0.5, "wander": 3.0, "wander_time": 50.0}
     pairs = []
     for trial in range(400):
         receiver = gps(trial, **settings)
@@ -138,7 +138,7 @@ def test_errors_of_gps_are_white_and_slow() -> None:
 
 def test_exact_increments_are_the_true_motion() -> None:
     """A turn, dive and roll with a changing velocity: readings summed by an independent integration give its end."""
-    exact = dict.fromkeys(ImuSettings.model_fields, 0.0) | {"enabled": True, "rate": 10.0}
+    exact: dict[str, Any] = dict.fromkeys(ImuSettings.model_fields, 0.0) | {"enabled": True, "rate": 10.0}
     unit, dt = Imu(ImuSettings(**exact), stream(1, 0, "imu")), 0.1
 
     def at(k: int) -> Truth:
@@ -164,7 +164,7 @@ def test_exact_increments_are_the_true_motion() -> None:
 
 def test_at_rest_it_feels_its_weight() -> None:
     """Pitched up by 0.3 rad: the specific force is -g along the vertical, g sin(pitch) ahead."""
-    exact = dict.fromkeys(ImuSettings.model_fields, 0.0) | {"enabled": True, "rate": 10.0}
+    exact: dict[str, Any] = dict.fromkeys(ImuSettings.model_fields, 0.0) | {"enabled": True, "rate": 10.0}
     unit = Imu(ImuSettings(**exact), stream(1, 0, "imu"))
     for time in (0.0, 0.1):
         reading = unit.measure(truth(time, attitude=(0.0, 0.3, 1.0), nu=(0.0,) * 6), Around())

@@ -29,6 +29,11 @@ class LawnMower(Settings):
     spacing: float = Field(default=30.0, gt=0, description="distance between lanes [m]")
     lanes: int = Field(default=4, ge=1, le=10_000, description="number of lanes")
     side: Literal["starboard", "port"] = Field(default="starboard", description="side of the other lanes")
+    order: Literal["adjacent", "racetrack"] = Field(
+        default="adjacent",
+        description="of the lanes: one after the next, or both halves in turn, so that turns are wide and neighbours "
+        "are run in one direction",
+    )
 
 
 class Weave(Settings):
@@ -83,8 +88,10 @@ def points(pattern: Waypoints | LawnMower) -> Array:
     along = np.array((math.cos(heading), math.sin(heading)))
     across = np.array((-along[1], along[0])) * (1.0 if pattern.side == "starboard" else -1.0)
     ends = []
-    for lane in range(pattern.lanes):
+    half = (pattern.lanes + 1) // 2
+    for number in range(pattern.lanes):
+        lane = number if pattern.order == "adjacent" else number // 2 + half * (number % 2)
         begin = np.array(pattern.corner) + lane * pattern.spacing * across
         lane_ends = [begin, begin + pattern.length * along]
-        ends += lane_ends if lane % 2 == 0 else lane_ends[::-1]
+        ends += lane_ends if number % 2 == 0 else lane_ends[::-1]
     return np.array(ends)

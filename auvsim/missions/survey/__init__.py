@@ -1,0 +1,1 @@
+"""Surveys: lanes at an altitude over the sea floor between a fix at the surface and the dock."""
