@@ -9,8 +9,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 ORDER = (
     "base", "water", "vehicles", "physics", "data", "acoustics", "sensors", "navigation", "control", "missions",
-    "simulation", "analysis", "video", "ros", "identification", "replay", "exchange", "campaign", "stress",
-    "reproduce", "studies", "cli",
+    "simulation", "analysis", "video", "ros", "identification", "replay", "exchange", "comparison", "campaign",
+    "stress", "reproduce", "studies", "cli",
 )  # fmt: skip
 KNOW_NO_ESTIMATORS = ("base", "water", "vehicles", "data", "acoustics", "sensors", "control", "cli")
 ESTIMATORS = ("core", "planar", "docking", "motion_radius", "path_prediction", "formation", "map_path")
