@@ -15,6 +15,7 @@ import tyro
 from auvsim import CACHE_NOTE, RENDERER_NOTE, __version__
 from auvsim.base.errors import AuvsimError, DrawingError, InputError
 from auvsim.base.neighbours import check_estimators
+from auvsim.cli.compare import Compare
 from auvsim.cli.export import Export
 from auvsim.cli.interruption import Interruption
 from auvsim.cli.parsing import files_first, parse
@@ -398,6 +399,7 @@ Command = (
     | Manoeuvre
     | Identify
     | Estimate
+    | Compare
     | Export
     | Video
     | Plot
@@ -593,6 +595,11 @@ def _run(arguments: list[str]) -> int:
             command.logs, estimators=command.estimator, what_if=what_if, smooth=command.smooth, out=command.out,
             columns=command.columns, vehicle=command.vehicle,
         )  # fmt: skip
+
+    if isinstance(command, Compare):
+        from auvsim.cli import compare
+
+        return compare.run(command)
 
     if isinstance(command, Export):
         from auvsim.cli import export
