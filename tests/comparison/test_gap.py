@@ -32,7 +32,7 @@ def sailed(path: Path, model: str, seed: int) -> None:
 
 @pytest.mark.parametrize(("factor", "grade"), [(1.0, "A"), (1.5, "C")])
 def test_changed_drag_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: float, grade: str):
-    """Half as much again of the hull's drag along its axis names X_uu; the same vehicle has the best grade and no name."""
+    """Half as much again of the hull's axial drag names X_uu; the same vehicle has the best grade and no name."""
     folder = tmp_path / "own"
     shutil.copytree(library.models_folder() / "remus100", folder)
     model = folder / "remus100.xml"
