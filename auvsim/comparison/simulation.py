@@ -70,4 +70,4 @@ def _ahead(values: Array, lag: float) -> Array:
     if lag <= 0.0:
         return values
     share = 1.0 - math.exp(-PERIOD / lag)
-    return values + np.append(np.diff(values), 0.0) * (1.0 / share - 1.0)
+    return values + np.append(np.diff(values), 0.0) / share
