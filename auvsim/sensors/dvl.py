@@ -153,4 +153,4 @@ def three_beams(all_four: Array, lost: int) -> Array:
     of_four = np.linalg.inv(all_four.T @ all_four)
     rest = np.delete(all_four, lost, axis=0)
     deviations = np.sqrt(np.diagonal(of_four))
-    return np.linalg.cholesky(np.linalg.inv(rest.T @ rest) / np.outer(deviations, deviations))
+    return np.asarray(np.linalg.cholesky(np.linalg.inv(rest.T @ rest) / np.outer(deviations, deviations)), dtype=float)

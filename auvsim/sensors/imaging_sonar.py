@@ -213,7 +213,7 @@ def geometry(settings: ImagingSonarSettings) -> tuple[Array, Array]:
     half = 0.5 * math.radians(settings.sector_deg)
     width = (settings.maximum_range - settings.minimum_range) / settings.bins
     ranges = settings.minimum_range + width * (np.arange(settings.bins) + 0.5)
-    return np.linspace(-half, half, settings.beams), ranges
+    return np.asarray(np.linspace(-half, half, settings.beams), dtype=float), ranges
 
 
 def absorption(frequency: float) -> float:

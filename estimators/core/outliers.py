@@ -49,7 +49,7 @@ class Outliers:
         Raises:
             ParameterError: There are more or fewer deviations than components.
         """
-        return self.prior * sum(_spread(d, size) for d in self.deviations) / len(self.deviations)
+        return self.prior * np.mean([_spread(d, size) for d in self.deviations], axis=0)
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)

@@ -17,7 +17,11 @@ PLAN = {
 }
 
 
-NEW = ("estimator.use", "docked_aligned", "final_along", "final_cross", "final_down", "final_angle_deg")  # columns
+NEW = (  # columns
+    "estimator.use", "docked_aligned", "final_along", "final_cross", "final_down", "final_angle_deg",
+    *(f"{name}{phase}" for name in ("relative_rms", "nees_relative")
+      for phase in ("", "_search", "_homing", "_approach", "_final", "_go_around", "_aborted")),
+)  # fmt: skip
 
 
 def copied(path: Path) -> Folder:

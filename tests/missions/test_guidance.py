@@ -113,7 +113,9 @@ def test_turned_line_runs_through_the_entrance() -> None:
     current = (0.0, 0.5)
     line = approach_course(0.0, SETTINGS.approach_speed, current, LIMIT)
     assert line > 0.1  # turned with the current that flows to starboard: the crab would be 30 degrees
-    guidance = new(DockingSettings(crab_limit_deg=60.0, ground_speed=0.0))  # not faster for the current
+    guidance = new(
+        DockingSettings(crab_limit_deg=60.0, ground_speed=0.0, speed_per_current=0.0)
+    )  # not faster for the current
     guidance._observe([fix(0.1)])
     courses = {}
     for off in (-2.0, 0.0, 2.0):

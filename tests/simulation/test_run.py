@@ -386,7 +386,7 @@ def funnel_clearance(trial: VehicleLog) -> np.ndarray:
 
 
 @pytest.mark.parametrize("angle", [90.0, -90.0])
-@pytest.mark.parametrize("start", [126.0, 129.0])
+@pytest.mark.parametrize("start", [96.0, 102.0])
 def test_goes_around_when_the_current_turns_before_the_dock(start: float, angle: float) -> None:
     """A following current of 0.5 m/s that turns across in the last metres: missed, seen, round, docked."""
     trial = run(

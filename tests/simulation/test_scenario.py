@@ -12,9 +12,10 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import rotation
 from auvsim.simulation.sampling import default_plan, draw, merge
 from auvsim.simulation.scenario import Rates, Scenario, from_yaml, parse, to_yaml
+from auvsim.simulation.sensor_settings import on_board
 from auvsim.simulation.short import ShortScenario
 
-CURRENTS = "none, uniform, turning, approach_turn, shear, gust, boundary_layer, wake, waves, grid, sum"
+CURRENTS = "none, uniform, turning, approach_turn, knots, shear, gust, boundary_layer, wake, waves, grid, sum"
 
 
 def nested(key: str, value: object) -> dict:
@@ -282,3 +283,10 @@ def test_places_of_a_fleet() -> None:
 def test_bad_values_of_a_fleet_are_named(key: str, value: object, text: str) -> None:
     """With the vehicle that they concern."""
     assert message(changed(key, value)).startswith(text)
+
+
+@pytest.mark.parametrize("kind", ["range", "gps", "altimeter", "fix"])
+def test_a_sensor_called_as_its_kind_is_there_once(kind: str) -> None:
+    found = parse({"sensors": {kind: {"kind": kind}}})
+    names = [name for name, _ in on_board(found.vehicles["remus100"].sensors)]
+    assert names.count(kind) == 1

@@ -36,7 +36,6 @@ FASTER = 0.3  # by how much homing is faster than an approach in a strong curren
 UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
 STEADY = 0.05  # deviation of a current that counts as known [m/s]
 RUSH = 0.5  # by how much that may exceed the speed of homing [m/s]
-PER_CURRENT = 3.0  # speed of an approach by that of the current, which may turn [-]
 AGAIN = 0.2  # how much faster each further attempt is [m/s]
 HOPELESS = 0.1  # speed over ground that is none [m/s]
 
@@ -189,7 +188,7 @@ class Docking(Mission):
             return self._paced[2]
         s = self._s
         unsteady = UNSTEADY_GAIN * max(here.unsteadiness - STEADY, 0.0) + AGAIN * (self.attempt - 1)
-        least = max(s.approach_speed, PER_CURRENT * math.hypot(*here.current)) + unsteady
+        least = max(s.approach_speed, s.speed_per_current * math.hypot(*here.current)) + unsteady
         least = min(least, max(s.homing_speed, s.approach_speed) + RUSH)
         crab = math.radians(s.crab_limit_deg)
         speed = speeds.speed_through_water(least, here.axis, here.current, s.ground_speed, crab, self._fastest)

@@ -34,6 +34,9 @@ class DockingSettings(Settings):
     ground_speed: float = Field(
         default=0.5, ge=0, description="speed over ground that a current must leave; speeds are raised for it [m/s]"
     )
+    speed_per_current: float = Field(
+        default=3.0, ge=0, description="least speed on the approach by that of the current, which may turn [-]"
+    )
     crab_limit_deg: float = Field(
         default=22.0, gt=0, lt=80, description="angle between heading and dock axis for which speeds are raised [deg]"
     )

@@ -31,8 +31,7 @@ class LawnMower(Settings):
     side: Literal["starboard", "port"] = Field(default="starboard", description="side of the other lanes")
     order: Literal["adjacent", "racetrack"] = Field(
         default="adjacent",
-        description="of the lanes: one after the next, or both halves in turn, so that turns are wide and neighbours "
-        "are run in one direction",
+        description="one lane after the next, or the halves in turn: wide turns, neighbours in one direction",
     )
 
 
