@@ -108,8 +108,12 @@ def test_it_sees_within_its_limits_only(key: str):
     distance = float(np.linalg.norm(ray()))
     angle = 2.0 * math.degrees(math.acos(ray()[0] / distance))
     at, inside = {"minimum_range": (distance, -1e-6), "maximum_range": (distance, 1e-6)}.get(key, (angle, 1e-6))
-    assert camera(**EXACT, **{key: at + inside}).measure(truth(), around(DOCK)) is not None
-    assert camera(**EXACT, **{key: at - inside}).measure(truth(), around(DOCK)) is None
+
+    def limit(by: float) -> dict[str, Any]:
+        return {key: at + by}
+
+    assert camera(**EXACT, **limit(inside)).measure(truth(), around(DOCK)) is not None
+    assert camera(**EXACT, **limit(-inside)).measure(truth(), around(DOCK)) is None
 
 
 def test_the_light_shines_out_of_the_mouth_and_the_nearest_is_found():
