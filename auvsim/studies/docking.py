@@ -123,6 +123,8 @@ def table(study: Study) -> Table:
         result.add_row(name, f"{successes} of {count}  ({100 * low:.1f} to {100 * high:.1f} %)", "95 % Wilson")
     misses = _known(s.miss_distance for s in docked)
     row("miss distance at the mouth, rms and max", (_rms(misses), max(misses, default=math.nan)), "m", ".3f")
+    parts = [_rms(_known(values)) for values in ((s.cross_track for s in docked), (s.vertical for s in docked))]
+    row("its parts across and downward, rms", parts, "m", ".3f")
     headings = [abs(value) for value in _known(s.heading_error_deg for s in docked)]
     row("heading error there, rms and max", (_rms(headings), max(headings, default=math.nan)), "deg")
     row("contact impulse, median and max", _middle_and_max([s.contact_impulse for s in docked]), "N s", ".1f")

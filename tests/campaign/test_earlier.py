@@ -18,6 +18,7 @@ PLAN = {
 
 
 NEW = ("estimator.use", "docked_aligned", "final_along", "final_cross", "final_down", "final_angle_deg")  # columns
+NEW += ("contacts", "shaft_energy", "way")
 
 
 def copied(path: Path) -> Folder:
