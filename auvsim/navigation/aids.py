@@ -1,4 +1,4 @@
-"""Gyro, DVL and ranges for the docking filters: which are on board, and the constant errors of their data sheets."""
+"""Gyro, DVL, ranges and a dock's light for the docking filters: which are on board, and their constant errors."""
 
 import math
 from collections.abc import Collection, Mapping
@@ -7,11 +7,12 @@ from typing import Any
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.gyro import GyroSettings
+from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.docking.aids import Aids
 from estimators.docking.noise import Bias
 
-KINDS = {"gyro": GyroSettings, "dvl": DvlSettings, "range": RangeSettings}
+KINDS = {"gyro": GyroSettings, "dvl": DvlSettings, "range": RangeSettings, "light": LightSettings}
 SPEED = 1.5  # at which a DVL's errors of scale and mounting are taken for biases [m/s]
 
 
@@ -27,6 +28,7 @@ def assumed(sensors: Mapping[str, Any]) -> Aids:
         gyro=any(isinstance(s, GyroSettings) for s in sensors.values()),
         dvl=any(isinstance(s, DvlSettings) for s in sensors.values()),
         ranges={name: s.transponder[:2] for name, s in sensors.items() if isinstance(s, RangeSettings)},
+        lights={name: s.camera[:2] for name, s in sensors.items() if isinstance(s, LightSettings)},
     )
 
 
@@ -45,4 +47,6 @@ def biases(sensors: Mapping[str, Any], compass: Any) -> dict[str, Bias]:
             case RangeSettings():
                 found[f"range_{name}"] = Bias(s.bias)
                 found[f"range_scale_{name}"] = Bias(s.scale_error)
+            case LightSettings():
+                found[f"light_{name}"] = Bias(math.radians(s.bias_deg))
     return {name: bias for name, bias in found.items() if bias.deviation > 0.0}

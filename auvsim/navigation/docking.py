@@ -18,6 +18,7 @@ from auvsim.navigation.estimate import DEPTH_BIAS, PLANAR_STATES, Estimate
 from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 from estimators.core.estimator import StateFilter
@@ -53,9 +54,9 @@ class DockingNavigator:
     """A docking estimator in a run.
 
     Compass readings since the last update are averaged (moved to now with the estimated yaw rate), fin and shaft
-    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. So do
-    ranges, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed; what it shows too much against the
-    dock's is a state of its own.
+    feedback are averaged over the interval they drove, fixes go to the delay buffer with their own stamps. So do ranges
+    and bearings of a light, and the last reading of a gyro or DVL. Depth is the gauge's, smoothed; what it shows too
+    much against the dock's is a state of its own.
 
     Args:
         estimator: in whose axes the dock's mouth is the origin.
@@ -76,7 +77,7 @@ class DockingNavigator:
         self._estimator, self._actuation = estimator, actuation
         self._vertical = vertical or VerticalFilter(UsblModel())
         self._dock, self._aids = dock, dict(aids or {})
-        biases = {f"{name}_bias": BIAS_UNITS.get(name, "1") for name in estimator.filter.noise.bias_names}
+        biases = {f"{name}_bias": _unit(name) for name in estimator.filter.noise.bias_names}
         self.states: Mapping[str, str] = {**PLANAR_STATES, **biases, DEPTH_BIAS: "m"}
         self._names = tuple(self.states)
         self.reset()
@@ -94,7 +95,7 @@ class DockingNavigator:
     ) -> Estimate:
         """The estimate at `time`, see `Navigator.update`."""
         headings, stamps, drives, fixes, reports = [], [], [], [], []
-        aided: dict[Any, Reading] = {}  # the last reading of a sensor, but every range
+        aided: dict[Any, Reading] = {}  # the last reading of a sensor, but every range and bearing of a light
         for reading in readings:
             if reading.sensor == "compass":
                 headings.append(float(reading.value[0]))
@@ -113,8 +114,8 @@ class DockingNavigator:
                 fixes.append(fix)
                 reports.append(float(reading.value[6]))
             elif reading.sensor in self._aids:
-                is_range = isinstance(self._aids[reading.sensor], RangeSettings)
-                aided[reading.sensor, reading.sequence if is_range else None] = reading
+                rare = isinstance(self._aids[reading.sensor], RangeSettings | LightSettings)
+                aided[reading.sensor, reading.sequence if rare else None] = reading
         rudder, shaft_speed = commands.rudder, commands.shaft_speed
         if drives:
             rudder, _, shaft_speed = self._actuation.effective(
@@ -176,6 +177,10 @@ class DockingNavigator:
         first = headings[0]
         offsets = [wrap(h - first) + self._yaw_rate * (time - t) for h, t in zip(headings, stamps, strict=True)]
         return wrap(first + sum(offsets) / len(offsets))
+
+
+def _unit(bias: str) -> str:
+    return "rad" if bias.startswith("light_") else BIAS_UNITS.get(bias, "1")
 
 
 def navigator(

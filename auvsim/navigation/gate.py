@@ -16,6 +16,7 @@ from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.imu import ImuSettings
+from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Actuation
 from estimators.core.screening import Limits, Screen
@@ -110,6 +111,8 @@ def _limits(settings: Any, actuation: Actuation, frozen: bool) -> list[Limits]:
             return [noisy(sigma, -SPEED, SPEED, JOLT) for sigma in sigmas]
         case RangeSettings():
             return [noisy(settings.noise, -SURE * settings.noise, 1.1 * settings.maximum, FASTEST)]
+        case LightSettings():
+            return [full, full]
         case AltimeterSettings():
             return [noisy(settings.noise, -SURE * settings.noise, 1.2 * settings.maximum_range, math.inf)]
         case ImuSettings():

@@ -13,9 +13,10 @@ from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
+from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from estimators.core.types import Measurement
-from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
+from estimators.docking.aids import BOTTOM, GYRO, LIGHT, RANGE, WATER
 from estimators.docking.sensors import COMPASS
 
 FIX = "fix"  # kind of measurement
@@ -33,7 +34,7 @@ def measurements(
     A DVL's track that is lost says nothing; components of one that are not numbers are for the filter to refuse.
 
     Args:
-        reading: Of a compass, gyro, DVL, range or position.
+        reading: Of a compass, gyro, DVL, range, light or position.
         settings: Of its sensor.
         depth: Of the vehicle [m].
         origin: Of the filter's axes, north and east [m].
@@ -61,6 +62,12 @@ def measurements(
             north, east, down = settings.beacon
             place = (north - origin[0], east - origin[1], down - depth - settings.transponder[2])
             yield _measurement(RANGE, reading, value, settings.noise, source=reading.sensor, parameters=place)
+        case LightSettings():
+            azimuth, elevation = value.tolist()
+            ray = np.array((math.cos(azimuth), math.sin(azimuth), -math.tan(elevation)))
+            x, y, _ = (rotation(tilt[1], tilt[0], 0.0) @ ray).tolist()
+            level, sigma = np.array((math.atan2(y, x),)), math.radians(settings.noise_deg)
+            yield _measurement(LIGHT, reading, level, sigma, source=reading.sensor)
         case FixSettings():
             yield _measurement(FIX, reading, value[:2], settings.noise, settings.noise)
         case GpsSettings():

@@ -43,8 +43,9 @@ class AugmentedSettings(_Assumed):
     dock_heading_state: bool = Field(
         default=True, description="whether that error is a constant, which is estimated, or white noise of each fix"
     )
-    use: tuple[Literal["gyro", "dvl", "range"], ...] = Field(
-        default=("gyro", "dvl", "range"), description="sensors it uses, where on board, besides compass and USBL"
+    use: tuple[Literal["gyro", "dvl", "range", "light"], ...] = Field(
+        default=("gyro", "dvl", "range", "light"),
+        description="sensors it uses, where on board, besides compass and USBL",
     )
 
 

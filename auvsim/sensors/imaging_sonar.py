@@ -213,7 +213,8 @@ def geometry(settings: ImagingSonarSettings) -> tuple[Array, Array]:
     half = 0.5 * math.radians(settings.sector_deg)
     width = (settings.maximum_range - settings.minimum_range) / settings.bins
     ranges = settings.minimum_range + width * (np.arange(settings.bins) + 0.5)
-    return np.asarray(np.linspace(-half, half, settings.beams), dtype=float), ranges
+    bearings = np.linspace(-half, half, settings.beams)
+    return np.asarray(bearings, dtype=float), np.asarray(ranges, dtype=float)
 
 
 def absorption(frequency: float) -> float:

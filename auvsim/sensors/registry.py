@@ -18,12 +18,13 @@ from auvsim.sensors.gps import Gps
 from auvsim.sensors.gyro import Gyro
 from auvsim.sensors.imaging_sonar import ImagingSonar
 from auvsim.sensors.imu import Imu
+from auvsim.sensors.light import Light
 from auvsim.sensors.range import Range
 from auvsim.sensors.sensor import Sensor
 from auvsim.vehicles.library import Vehicle
 
 STANDARD: tuple[type[Sensor], ...] = (Compass, Depth, Feedback, Dvl, Gyro)  # every vehicle has settings for them
-OTHERS: tuple[type[Sensor], ...] = (Range, Fix, ImagingSonar, Altimeter, Gps, Imu)
+OTHERS: tuple[type[Sensor], ...] = (Range, Fix, ImagingSonar, Altimeter, Gps, Imu, Light)
 SENSORS: dict[str, type[Sensor]] = {sensor.kind: sensor for sensor in (*STANDARD, *OTHERS)}
 
 

@@ -67,7 +67,8 @@ def rated(sensors: SensorSettings) -> Iterator[tuple[str, float]]:
 
 def on_board(sensors: SensorSettings) -> Iterator[tuple[str, Any]]:
     """Names and settings of the sensors on board that the vehicle has, in the order in which they are read."""
-    for name in dict.fromkeys((*SENSORS, *(sensors.__pydantic_extra__ or {}))):  # one may be called as its kind is
+    names: list[str] = [*SENSORS, *(sensors.__pydantic_extra__ or {})]
+    for name in dict.fromkeys(names):  # one may be called as its kind is
         settings = getattr(sensors, name, None)
         if settings is not None and getattr(settings, "enabled", True):
             yield name, settings

@@ -122,11 +122,17 @@ def table(study: Study) -> Table:
         low, high = wilson(successes, count)
         result.add_row(name, f"{successes} of {count}  ({100 * low:.1f} to {100 * high:.1f} %)", "95 % Wilson")
     misses = _known(s.miss_distance for s in docked)
-    row("miss distance at the mouth, rms and max", (_rms(misses), max(misses, default=math.nan)), "m")
+    row("miss distance at the mouth, rms and max", (_rms(misses), max(misses, default=math.nan)), "m", ".3f")
+    parts = [_rms(_known(values)) for values in ((s.cross_track for s in docked), (s.vertical for s in docked))]
+    row("its parts across and downward, rms", parts, "m", ".3f")
     headings = [abs(value) for value in _known(s.heading_error_deg for s in docked)]
     row("heading error there, rms and max", (_rms(headings), max(headings, default=math.nan)), "deg")
     row("contact impulse, median and max", _middle_and_max([s.contact_impulse for s in docked]), "N s", ".1f")
     row("contact force, median and max", _middle_and_max([s.peak_contact_force for s in docked]), "N", ".0f")
+    row("contacts, median and max", _middle_and_max([float(s.contacts) for s in docked]), "1", ".0f")
+    energies = [1e-3 * energy for energy in _known(s.shaft_energy for s in docked)]
+    row("shaft energy to dock, median and max", _middle_and_max(energies), "kJ", ".1f")
+    row("way through the water, median and max", _middle_and_max([s.way for s in docked]), "m", ".0f")
     row("time to dock, median and max", _middle_and_max([s.time for s in docked]), "s", ".0f")
     for phase in ("all", "homing", "approach", "final", "go_around"):
         values = (study.estimate_rms("position_rms", phase), study.estimate_rms("current_rms", phase))

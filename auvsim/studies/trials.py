@@ -28,6 +28,9 @@ class Summary:
     heading_error_deg: float | None
     contact_impulse: float  # [N s]
     peak_contact_force: float  # [N]
+    contacts: int  # separate ones
+    shaft_energy: float | None  # [J]
+    way: float  # through the water [m]
     estimate: dict[str, EstimateQuality]  # over all phases ("all") and by phase
     real_time_factor: float | None
 

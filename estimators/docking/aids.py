@@ -1,4 +1,4 @@
-"""What a vehicle may have besides compass and USBL: gyro, DVL, ranges to beacons; each with its constant errors."""
+"""What a vehicle may have besides compass and USBL: gyro, DVL, ranges, a dock's light; each with constant errors."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -9,7 +9,8 @@ from estimators.core.states import StateSpace
 from estimators.core.types import MeasurementModel
 from estimators.planar.model import Biases
 
-GYRO, BOTTOM, WATER, RANGE = "gyro", "dvl_bottom", "dvl_water", "range"  # kinds of measurement
+GYRO, BOTTOM, WATER, RANGE, LIGHT = "gyro", "dvl_bottom", "dvl_water", "range", "light"  # kinds of measurement
+MOUTH = (0.0, 0.0, 0.0)  # in the filters' axes
 STATES = {
     "north": "m", "east": "m", "heading": "rad", "surge": "m/s", "sway": "m/s", "yaw_rate": "rad/s",
     "current_north": "m/s", "current_east": "m/s",
@@ -25,6 +26,8 @@ class Aids:
     # Places of the transponders of ranging sensors on the hull, (x, y) forward and starboard [m], by source. A
     # measurement's parameters say where its beacon is from the dock: north, east, and down from the transponder [m].
     ranges: Mapping[str, tuple[float, float]] | None = None
+    # Places of cameras that see the light in the dock's mouth, likewise. They measure its bearing from the bow.
+    lights: Mapping[str, tuple[float, float]] | None = None
 
     def models(self, biases: Biases) -> dict[str | tuple[str, str], MeasurementModel]:
         """Measurement models of the planar state with these biases; those of a sensor's own name are its error."""
@@ -46,4 +49,6 @@ class Aids:
             (scale,) = own(f"range_scale_{source}")
             bias = own(f"range_{source}")
             found[RANGE, source] = sensors.range_to(motion, point=point, bias=bias, scale=scale)
+        for source, point in (self.lights or {}).items():
+            found[LIGHT, source] = sensors.bearing_to(motion, MOUTH, point=point, bias=own(f"light_{source}"))
         return found

@@ -10,7 +10,7 @@ from estimators.core.errors import ParameterError
 from estimators.core.types import Array
 from estimators.planar.model import BIASES, Biases
 
-AIDED = ("gyro", "dvl_surge", "dvl_sway", "range_")  # how the errors of `aids` are called
+AIDED = ("gyro", "dvl_surge", "dvl_sway", "range_", "light_")  # how the errors of `aids` are called
 
 
 @dataclass(frozen=True, slots=True)

@@ -155,7 +155,7 @@ def test_the_shipped_plan() -> None:
     assert len({found.values(name, 0)["estimator"]["kind"] for name in found.variants}) == 3
     with pytest.raises(
         InputError,
-        match=r"no plan 'navigator': .*shipped \(docking_edges, .*lauv_docking, leader_follower, navigators, remus100_water, ",
+        match=r"no plan 'navigator': .*shipped \(docking_edges, .*leader_follower, navigators, remus100_water, ",
     ):
         plan.load("navigator")
 

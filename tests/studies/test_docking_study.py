@@ -52,7 +52,17 @@ def test_table_and_reasons(study: Study) -> None:
     text = output.getvalue()
     assert f"10 docking trials, seed {SEED}" in text
     assert "10 of 10  (72.2 to 100.0 %)" in text
-    for name in ("miss distance", "heading error", "contact impulse", "time to dock", "NEES", "real-time factor"):
+    for name in (
+        "miss distance",
+        "heading error",
+        "contact impulse",
+        "contacts,",
+        "shaft energy",
+        "way through",
+        "time to dock",
+        "NEES",
+        "real-time factor",
+    ):
         assert text.count(name) == 1
 
 

@@ -15,6 +15,9 @@ COLUMNS = {  # column: heading
     "position_rms": "position rms [m]",
     "nees_per_dof": "NEES",
     "contact_impulse": "impulse [N s]",
+    "contacts": "contacts",
+    "shaft_energy": "shaft energy [J]",
+    "way": "way [m]",
     "time": "time [s]",
     "wall_time": "wall time [s]",
 }

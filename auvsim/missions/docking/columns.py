@@ -28,6 +28,13 @@ COLUMNS: Mapping[str, Metric] = {
     "peak_contact_force": Metric(
         "float", "N", "largest contact force, friction included, until then; as uncertain as the panels' stiffness"
     ),
+    "contacts": Metric(
+        "int", "1", "separate contacts until then, 0.2 s apart or more, the last one in the dock included"
+    ),
+    "shaft_energy": Metric(
+        "float", "J", "energy that the shaft gave to the propeller until the time of docking or the end"
+    ),
+    "way": Metric("float", "m", "through the water, until then"),
     "docked_aligned": Metric("bool", "1", "whether it docked and lies within the dock's own limit of its axis"),
     "final_along": Metric("float", "m", "of the nose behind the mouth, along the axis, at the end, if it docked"),
     "final_cross": Metric("float", "m", "of the nose to starboard of the axis, then"),

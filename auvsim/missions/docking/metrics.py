@@ -11,6 +11,7 @@ from auvsim.base.frames import wrap
 from auvsim.data.log import VehicleLog
 from auvsim.data.phases import latest, phase_at
 from auvsim.missions.docking.dock_frame import in_dock_frame, nose_position
+from auvsim.missions.docking.effort import effort
 from auvsim.vehicles.library import ALIGNED
 
 FAILURES = ("timeout", "diverged", "aborted")  # kinds of event that end a run without docking
@@ -41,6 +42,7 @@ def docking_metrics(log: VehicleLog) -> dict[str, Any]:
     reason, text = (None, None) if docked_at is not None else _failure(log)
     contact = log["contact"]
     entry = slice(None if docked_at is None else int(np.searchsorted(contact["time"], docked_at, side="right")))
+    end = end_of(log) if docked_at is None else docked_at
     attempts = int(log["mission"]["attempt"].max(initial=0))
     return {
         "docked": docked_at is not None,
@@ -48,13 +50,14 @@ def docking_metrics(log: VehicleLog) -> dict[str, Any]:
         "failure_reason": reason,
         "failure_text": text,
         "attempts": attempts,
-        "time": end_of(log) if docked_at is None else docked_at,
+        "time": end,
         "miss_distance": last.miss_distance if last else None,
         "cross_track": last.cross_track if last else None,
         "vertical": last.vertical if last else None,
         "heading_error_deg": last.heading_error_deg if last else None,
         "contact_impulse": float(contact["impulse"][entry].max(initial=0.0)),
         "peak_contact_force": float(contact["force"][entry].max(initial=0.0)),
+        **effort(log, end),
         **_at_rest(log, docked_at),
         "crossings": [dataclasses.asdict(crossing) for crossing in passed],
     }
