@@ -1,0 +1,186 @@
+"""Surveys by sonar: errors over the lanes with and without loop closures, beside dead reckoning's on the same readings.
+
+The shipped scenario `survey`, steered by its own estimator, with closures. Dead reckoning and the sonar without closures
+are given the same readings beside it. No frame shows a turn of the whole path, so each path is also judged after the
+rotation about the dive point that brings it closest to the true one.
+"""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import RenderableType
+from rich.table import Table
+
+from auvsim.base.frames import Array
+from auvsim.base.tasks import Progress, Task, run_tasks
+from auvsim.missions.survey.mission import DIVE, LANES
+from auvsim.navigation import registry
+from auvsim.navigation.estimate import Estimate
+from auvsim.simulation.loading import load_scenario
+from auvsim.simulation.run import Simulation
+from auvsim.simulation.setups import navigator_setup
+
+RECKONING, OPEN, CLOSED, WHOLE = "dead reckoning", "sonar, no closures", "sonar", "sonar, path at the end"
+BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """Options of the command."""
+
+    trials: int = 8
+    """Missions."""
+    seed: int = 30
+    """Seed of every random number."""
+    jobs: int | None = None
+    """Processes; by default one for each core."""
+
+
+class Errors(NamedTuple):
+    """Of one estimator over the lanes of one mission."""
+
+    raw: float  # horizontal, rms [m]
+    turned: float  # the same after the rotation about the dive point [m]
+    nees: float  # of the horizontal position, over 2
+
+
+class Trial(NamedTuple):
+    """What one mission came to."""
+
+    errors: dict[str, Errors]  # by estimator
+    floor: float  # the compass' constant error times the distance from the dive point, rms [m]
+    closures: int  # believed on the lanes
+    docked: bool
+
+
+class Beside:
+    """A navigator, with others that are given the same."""
+
+    def __init__(self, first: Any, others: Mapping[str, Any]) -> None:
+        self.first, self.others, self.states = first, others, first.states
+        self.latest: dict[str, Estimate] = {}
+
+    def update(self, *arguments: Any) -> Estimate:
+        """The first one's estimate; those of all are in `latest`."""
+        found = self.first.update(*arguments)
+        self.latest = {CLOSED: found, **{name: other.update(*arguments) for name, other in self.others.items()}}
+        return found
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        for navigator in (self.first, *self.others.values()):
+            navigator.reset()
+
+
+def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> Trial:
+    """Runs one mission.
+
+    Args:
+        seed: of all random streams.
+        trial: number of the mission under that seed.
+        pinned: values of the scenario on top of its own.
+    """
+    scenario = load_scenario("survey", **(pinned or {}))
+    simulation = Simulation(scenario, seed, trial, record=False)
+    (agent,) = simulation.agents
+    assumed = scenario.vehicles[agent.name].estimator
+    others = {
+        name: registry.build(
+            navigator_setup(scenario, agent.name, agent.vehicle, assumed.model_copy(update=dict(changed)))
+        )
+        for name, changed in BESIDE.items()
+    }
+    sonar: Any = agent.navigator
+    agent.navigator = beside = Beside(sonar, others)
+    (bias,) = (s.heading_bias for s, _, _ in agent.sensors if hasattr(s, "heading_bias"))
+    times, truths, dive, kept, closures = [], [], None, None, 0
+    shown: dict[str, list[tuple[Array, Array]]] = {name: [] for name in (CLOSED, *BESIDE)}
+    last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
+    while simulation.ticks < last and not simulation.over:
+        before = agent.estimate
+        simulation.step()
+        phase = agent.mission.phase
+        if phase == DIVE and dive is None:
+            dive = simulation.truths[agent.name].position[:2].copy()
+        if phase == LANES and agent.estimate is not before:
+            times.append(simulation.time)
+            truths.append(simulation.truths[agent.name].position[:2].copy())
+            for name, e in beside.latest.items():
+                shown[name].append((e.position[:2].copy(), e.horizontal_covariance.copy()))
+        elif phase > LANES and kept is None:
+            kept, closures = sonar.path, sonar.closed  # before any fix by the dock
+    assert dive is not None
+    true = np.array(truths)
+    errors = {name: judged(*map(np.array, zip(*shown[name], strict=True)), true, dive) for name in shown}  # pyright: ignore
+    if kept is not None:
+        on_lanes = (kept[0] >= times[0]) & (kept[0] <= times[-1])
+        there = np.column_stack([np.interp(kept[0][on_lanes], times, true[:, k]) for k in range(2)])
+        errors[WHOLE] = judged(kept[1][on_lanes, :2], None, there, dive)
+    floor = abs(float(bias)) * rms(true - dive)
+    return Trial(errors, floor, closures, agent.mission.at_rest)
+
+
+def judged(path: Array, covariances: Array | None, true: Array, dive: Array) -> Errors:
+    """Errors of a path (n, 2) with covariances (n, 2, 2), whose NEES is NaN without, against the true one (n, 2)."""
+    off = path - true
+    nees = math.nan
+    if covariances is not None:
+        nees = float(np.einsum("ki,ki->k", off, np.linalg.solve(covariances, off[..., None])[..., 0]).mean()) / 2.0
+    return Errors(rms(off), rms(turned(path, true, dive) - true), nees)
+
+
+def turned(path: Array, true: Array, about: Array) -> Array:
+    """A path (n, 2) after the rotation about a place (2,) that brings it closest to the true one (n, 2)."""
+    p, q = path - about, true - about
+    angle = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
+    c, s = math.cos(angle), math.sin(angle)
+    return about + p @ np.array(((c, s), (-s, c)))
+
+
+def rms(off: Array) -> float:
+    """Root of the mean square of the lengths of vectors (n, 2)."""
+    return math.sqrt(float((off**2).sum(axis=1).mean()))
+
+
+def report(options: Options, progress: Progress | None = None) -> Sequence[RenderableType]:
+    """Runs the study and returns its table."""
+    tasks = [Task(key=k, work=partial(run_one, options.seed, k)) for k in range(options.trials)]
+    done = run_tasks(tasks, options.jobs, progress)
+    return [table([done[k] for k in range(options.trials)], options)]
+
+
+def table(trials: Sequence[Trial], options: Options) -> Table:
+    """A row a mission and one of all: errors turned and raw, floor, NEES by estimator, closures, docked."""
+    title = f"survey, seed {options.seed}: rms over the lanes [m]; DR dead reckoning, S sonar, -C without closures"
+    shown = Table(title=title, caption="turned: about the dive point; path: of the keyframes, when the lanes are done")
+    headings = ("trial", "turned: DR", "S-C", "S", "S path", "S / DR", "raw: DR", "S-C", "S", "S path", "floor",
+                "NEES: DR", "S-C", "S", "closures", "docked")  # fmt: skip
+    for heading in headings:
+        shown.add_column(heading, justify="right")
+    for k, trial in enumerate(trials):
+        shown.add_row(str(k), *_cells([trial]), str(trial.closures), "yes" if trial.docked else "no")
+    shown.add_section()
+    docked = f"{sum(t.docked for t in trials)} of {len(trials)}"
+    shown.add_row("all", *_cells(trials), f"{np.mean([t.closures for t in trials]):.0f}", docked)
+    return shown
+
+
+def _cells(trials: Sequence[Trial]) -> list[str]:
+    """Rms over missions of errors, and mean NEES."""
+
+    def together(name: str, field: str) -> float:
+        return _root([getattr(t.errors[name], field) if name in t.errors else math.nan for t in trials])
+
+    names = (RECKONING, OPEN, CLOSED, WHOLE)
+    turned_, raw = ([together(name, field) for name in names] for field in ("turned", "raw"))
+    nees = [float(np.mean([t.errors[name].nees for t in trials])) for name in names[:3]]
+    values = (*turned_, turned_[2] / turned_[0], *raw, _root([t.floor for t in trials]), *nees)
+    return [f"{value:.2f}" for value in values]
+
+
+def _root(values: Sequence[float]) -> float:
+    return math.sqrt(float(np.mean(np.square(values))))
