@@ -162,7 +162,7 @@ def report(options: Options, progress: Progress | None = None) -> Sequence[Rende
 
 def table(trials: Sequence[Trial], options: Options) -> Table:
     """A row a mission and one of all: errors turned and raw, floor, NEES by estimator, closures, docked."""
-    title = f"survey, seed {options.seed}: rms over the lanes [m]; DR dead reckoning, S sonar, -C without closures"
+    title = f"survey, seed {options.seed}: rms over the lanes, in m; DR dead reckoning, S sonar, -C without closures"
     shown = Table(
         title=title,
         caption="turned: from the dive point on, rotated about it; path: of the keyframes when the lanes are done",
