@@ -28,9 +28,15 @@ PHASE_COLOURS = {
     "manoeuvre": "#1f77b4",
     "under_way": "#1f77b4",
     "done": "#9467bd",
+    "fix": "#c2185b",
+    "dive": "#444444",
+    "lanes": "#b8a000",
+    "surface": "#e377c2",
+    "home": "#8c564b",
 }
 OTHER_PHASES = ("#1f77b4", "#17a2a2", "#2ca02c", "#ff7f0e", "#9467bd", "#8c564b")  # of missions of the user's own
 MOST_IN_ROW = 13  # entries of a legend
+LONGEST_ROW = 175  # of a legend, in letters, of which the sample of an entry takes six
 NO_PHASE = "#444444"
 VEHICLES = ("#1f77b4", "#d95f02", "#2c8c2c", "#9467bd", "#c2185b", "#7f6a00", "#17a2a2", "#444444")
 DOCK = "#8c4a1f"
@@ -116,8 +122,9 @@ def shade_phases(axes: Axes, log: VehicleLog) -> None:
 
 
 def legend(figure: Figure, entries: dict[str, Any]) -> None:
-    """One row below all axes, or two where there are many entries."""
+    """One row below all axes, or two where there are many entries or long ones."""
     handles, labels = list(entries.values()), list(entries)
-    columns = len(labels) if len(labels) <= MOST_IN_ROW else (len(labels) + 1) // 2
+    fits = len(labels) <= MOST_IN_ROW and sum(len(label) + 6 for label in labels) <= LONGEST_ROW
+    columns = len(labels) if fits else (len(labels) + 1) // 2
     style: dict[str, Any] = {"fontsize": 9.5, "frameon": False, "columnspacing": 1.4}
     figure.legend(handles, labels, loc="outside lower center", ncols=columns, **style)

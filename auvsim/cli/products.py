@@ -11,6 +11,7 @@ from auvsim.data.log import Log, read
 
 NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `auvsim video {log}` makes it"
 VIDEOS = ("docking.mp4", "run.mp4")  # of a docking by one vehicle, and of anything else
+MAP = "feature_map.png"
 
 
 def is_manoeuvre(log: Log) -> bool:
@@ -45,6 +46,19 @@ def plots(log: Log, folder: Path) -> None:
     for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
         with whole(folder / name) as partial:
             draw(log.vehicle(), partial)
+
+
+def sonar_map(simulation: Any, folder: Path) -> None:
+    """Draws feature_map.png of a lone vehicle that navigates by a sonar; nothing of others."""
+    from auvsim.analysis import sonar_map
+    from auvsim.navigation.sonar import SonarNavigator
+
+    navigators = [agent.navigator for agent in simulation.agents]
+    if len(navigators) == 1 and isinstance(navigators[0], SonarNavigator):
+        _, poses, images = navigators[0].path
+        if len(poses):
+            with whole(folder / MAP) as partial:
+                sonar_map.sonar_map(images, poses, navigators[0].grid, partial)
 
 
 def video_name(log: Log) -> str:

@@ -1,8 +1,8 @@
-"""Surveys by sonar: errors over the lanes with and without loop closures, beside dead reckoning's on the same readings.
+"""Surveys by sonar: errors over the lanes with and without loop closures, beside dead reckoning's on equal readings.
 
-The shipped scenario `survey`, steered by its own estimator, with closures. Dead reckoning and the sonar without closures
-are given the same readings beside it. No frame shows a turn of the whole path, so each path is also judged after the
-rotation about the dive point that brings it closest to the true one.
+The shipped scenario `survey`, steered by its own estimator, with closures. Dead reckoning and the sonar without them
+are given the same readings beside it. No frame shows where the dive began or a turn of the whole path, so each is also
+judged from the dive point on, after the rotation about it that brings the path closest to the true one.
 """
 
 import math
@@ -44,7 +44,7 @@ class Errors(NamedTuple):
     """Of one estimator over the lanes of one mission."""
 
     raw: float  # horizontal, rms [m]
-    turned: float  # the same after the rotation about the dive point [m]
+    turned: float  # the same from the dive point on, after the rotation about it [m]
     nees: float  # of the horizontal position, over 2
 
 
@@ -97,15 +97,17 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
     sonar: Any = agent.navigator
     agent.navigator = beside = Beside(sonar, others)
     (bias,) = (s.heading_bias for s, _, _ in agent.sensors if hasattr(s, "heading_bias"))
-    times, truths, dive, kept, closures = [], [], None, None, 0
+    times, truths, kept, closures = [], [], None, 0
+    dive: dict[str, Array] = {}  # where it began, by estimator; "" the true place
     shown: dict[str, list[tuple[Array, Array]]] = {name: [] for name in (CLOSED, *BESIDE)}
     last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
     while simulation.ticks < last and not simulation.over:
         before = agent.estimate
         simulation.step()
         phase = agent.mission.phase
-        if phase == DIVE and dive is None:
-            dive = simulation.truths[agent.name].position[:2].copy()
+        if phase == DIVE and not dive:
+            dive = {name: e.position[:2].copy() for name, e in beside.latest.items()}
+            dive[""] = simulation.truths[agent.name].position[:2].copy()
         if phase == LANES and agent.estimate is not before:
             times.append(simulation.time)
             truths.append(simulation.truths[agent.name].position[:2].copy())
@@ -113,32 +115,37 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
                 shown[name].append((e.position[:2].copy(), e.horizontal_covariance.copy()))
         elif phase > LANES and kept is None:
             kept, closures = sonar.path, sonar.closed  # before any fix by the dock
-    assert dive is not None
-    true = np.array(truths)
-    errors = {name: judged(*map(np.array, zip(*shown[name], strict=True)), true, dive) for name in shown}  # pyright: ignore
+    true, at = np.array(truths), dive[""]
+    errors = {
+        name: judged(np.array([p for p, _ in rows]), np.array([P for _, P in rows]), true, dive[name], at)
+        for name, rows in shown.items()
+    }
     if kept is not None:
         on_lanes = (kept[0] >= times[0]) & (kept[0] <= times[-1])
         there = np.column_stack([np.interp(kept[0][on_lanes], times, true[:, k]) for k in range(2)])
-        errors[WHOLE] = judged(kept[1][on_lanes, :2], None, there, dive)
-    floor = abs(float(bias)) * rms(true - dive)
+        errors[WHOLE] = judged(kept[1][on_lanes, :2], None, there, dive[CLOSED], at)
+    floor = abs(float(bias)) * rms(true - at)
     return Trial(errors, floor, closures, agent.mission.at_rest)
 
 
-def judged(path: Array, covariances: Array | None, true: Array, dive: Array) -> Errors:
-    """Errors of a path (n, 2) with covariances (n, 2, 2), whose NEES is NaN without, against the true one (n, 2)."""
+def judged(path: Array, covariances: Array | None, true: Array, believed: Array, at: Array) -> Errors:
+    """Errors of a path (n, 2) with covariances (n, 2, 2), whose NEES is NaN without, against the true one (n, 2).
+
+    The dive began where the estimator believed (2,), in truth `at` (2,).
+    """
     off = path - true
     nees = math.nan
     if covariances is not None:
         nees = float(np.einsum("ki,ki->k", off, np.linalg.solve(covariances, off[..., None])[..., 0]).mean()) / 2.0
-    return Errors(rms(off), rms(turned(path, true, dive) - true), nees)
+    p, q = path - believed, true - at
+    return Errors(rms(off), rms(turned(p, q) - q), nees)
 
 
-def turned(path: Array, true: Array, about: Array) -> Array:
-    """A path (n, 2) after the rotation about a place (2,) that brings it closest to the true one (n, 2)."""
-    p, q = path - about, true - about
+def turned(p: Array, q: Array) -> Array:
+    """A path (n, 2) after the rotation about the origin that brings it closest to another (n, 2)."""
     angle = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
     c, s = math.cos(angle), math.sin(angle)
-    return about + p @ np.array(((c, s), (-s, c)))
+    return p @ np.array(((c, s), (-s, c)))
 
 
 def rms(off: Array) -> float:
@@ -148,15 +155,18 @@ def rms(off: Array) -> float:
 
 def report(options: Options, progress: Progress | None = None) -> Sequence[RenderableType]:
     """Runs the study and returns its table."""
-    tasks = [Task(key=k, work=partial(run_one, options.seed, k)) for k in range(options.trials)]
+    tasks = [Task(key=(k,), work=partial(run_one, options.seed, k)) for k in range(options.trials)]
     done = run_tasks(tasks, options.jobs, progress)
-    return [table([done[k] for k in range(options.trials)], options)]
+    return [table([done[k,] for k in range(options.trials)], options)]
 
 
 def table(trials: Sequence[Trial], options: Options) -> Table:
     """A row a mission and one of all: errors turned and raw, floor, NEES by estimator, closures, docked."""
-    title = f"survey, seed {options.seed}: rms over the lanes [m]; DR dead reckoning, S sonar, -C without closures"
-    shown = Table(title=title, caption="turned: about the dive point; path: of the keyframes, when the lanes are done")
+    title = f"survey, seed {options.seed}: rms over the lanes, in m; DR dead reckoning, S sonar, -C without closures"
+    shown = Table(
+        title=title,
+        caption="turned: from the dive point on, rotated about it; path: of the keyframes when the lanes are done",
+    )
     headings = ("trial", "turned: DR", "S-C", "S", "S path", "S / DR", "raw: DR", "S-C", "S", "S path", "floor",
                 "NEES: DR", "S-C", "S", "closures", "docked")  # fmt: skip
     for heading in headings:

@@ -8,6 +8,8 @@ import pytest
 from auvsim.base.reading import Reading
 from auvsim.missions.survey.altitude import AltitudeKeeper
 from auvsim.missions.track.patterns import LawnMower, points
+from auvsim.simulation.loading import load_scenario
+from auvsim.simulation.sensor_settings import on_board
 
 
 def test_a_racetrack_runs_each_lane_once_and_neighbours_one_way() -> None:
@@ -33,3 +35,10 @@ def test_altitude_by_a_tilted_altimeter_within_safe_depths() -> None:
     assert keeper.floor == pytest.approx(10.0 + 12.0 * down, abs=0.01)
     assert keeper.depth(41.2) == 14.0
     assert keeper.depth(47.0) == 8.0
+
+
+def test_a_sensor_named_as_its_kind_is_on_board_once() -> None:
+    """So the shipped scenario's altimeter and GPS are each read once a period."""
+    names = [name for name, _ in on_board(load_scenario("survey").vehicles["remus100"].sensors)]
+    assert sorted(names) == sorted({*names})
+    assert {"altimeter", "gps", "sonar"} <= {*names}
