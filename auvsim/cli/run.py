@@ -36,7 +36,8 @@ def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, na
             print(f"auvsim: {diagnosis(log)}; {path} holds the run up to there", file=sys.stderr)
             return 1
         products.plots(log, out)
-        products.sonar_map(ended[0], out)
+        for simulation in ended:
+            products.sonar_map(simulation, out)
         if video:
             _video(log, out)
     except OSError as error:
