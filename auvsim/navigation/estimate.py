@@ -47,6 +47,15 @@ class Estimate:
     reinitialised: int = 0  # number of restarts after its numbers were no longer finite
     outcomes: tuple[Outcome, ...] = ()  # of the measurements accepted or refused since the last estimate
 
+    @classmethod
+    def unknown(cls, time: float) -> "Estimate":
+        """The estimate at a time [s] of which nothing is known: zeros, not initialised."""
+        nothing = np.zeros(3)
+        return cls(
+            time=time, position=nothing, heading=0.0, velocity=nothing, current=nothing[:2],
+            covariance=np.zeros((8, 8)), initialised=False,
+        )  # fmt: skip
+
     @property
     def state(self) -> Array:
         """(n,) mean of the named states."""

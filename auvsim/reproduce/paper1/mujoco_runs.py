@@ -171,11 +171,7 @@ class _Listener:
         self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Commands
     ) -> Estimate:
         self.ticks.append(Tick(time, tuple(readings), commands, planar_state(self.truth())))
-        nothing = np.zeros(3)
-        return Estimate(
-            time=time, position=nothing, heading=0.0, velocity=nothing, current=nothing[:2],
-            covariance=np.zeros((8, 8)), initialised=False,
-        )  # fmt: skip
+        return Estimate.unknown(time)
 
     def reset(self) -> None:
         self.ticks.clear()
