@@ -6,6 +6,7 @@ import h5netcdf
 import h5py
 import numpy as np
 import pytest
+import xarray
 from log_samples import PHASES, STATES, record, recorder, sample_log
 
 from auvsim.base.errors import InputError
@@ -111,7 +112,6 @@ def test_other_netcdf_readers_find_names_units_and_dimensions(log: Log, file: Pa
 
 
 def test_xarray_opens_a_group(log: Log, file: Path):
-    xarray = pytest.importorskip("xarray")
     with xarray.open_dataset(file, group=f"{OWN}/truth", engine="h5netcdf") as truth:
         np.testing.assert_array_equal(truth["nu"].values, log.groups[f"{OWN}/truth"]["nu"])
         assert truth["nu"].dims == ("time", "uvwpqr")
