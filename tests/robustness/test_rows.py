@@ -320,7 +320,7 @@ def test_logs_of_two_versions_of_a_vehicle_are_told_apart() -> None:
 )  # fmt: skip
 def test_a_log_after_an_option_of_several_names(given: str, meant: str) -> None:
     """Is a log."""
-    from auvsim.cli import TAKE_NAMES
+    from auvsim.cli.commands import TAKE_NAMES
     from auvsim.cli.parsing import files_first
 
     tokens = given.split()
