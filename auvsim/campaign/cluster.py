@@ -71,7 +71,7 @@ class Cluster:
             self._stack.close()
 
     def run(self, function: Callable[[Any], Any], tasks: Iterable[Any], *, timeout: float) -> Iterator[tuple[Any, Any]]:
-        """As `local.Pool.run`.
+        """Each task with what the function returns for it on the workers, or a Death, in the order in which they end.
 
         Raises:
             AuvsimError: If the scheduler is lost.

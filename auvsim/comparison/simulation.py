@@ -55,7 +55,7 @@ def in_mujoco(vehicle: str, record: Record, surge: float, *, measured: bool = Tr
 
 
 def in_planar(parameters: PlanarParameters, record: Record, surge: float) -> Array:
-    """The same by a planar model; NaN from where it leaves all bounds."""
+    """The record's motion as a planar model predicts it, open loop; NaN from where it leaves all bounds."""
     process = PlanarProcess(parameters, np.zeros(8))
     inputs = np.ascontiguousarray(record.inputs, dtype=float)
     parts = max(1, math.ceil(record.step / 0.05 - 1e-9))

@@ -116,7 +116,7 @@ def track(x, P, inputs, measured, variances, p, q, h, substeps, e, s):
 
 @compiled
 def trace(x, P, inputs, measured, variances, p, q, h, substeps):
-    """As `track`, but gives the filtered means (n, 12) and covariances (n, 12, 12)."""
+    """Filters a record and gives the means (n, 12) and covariances (n, 12, 12) after each sample."""
     count = measured.shape[0]
     means, covariances = np.empty((count, STATES)), np.empty((count, STATES, STATES))
     F, work, following = np.eye(STATES), np.empty((STATES, STATES)), np.empty(8)

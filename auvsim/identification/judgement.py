@@ -42,7 +42,7 @@ class HoldoutResult:
 
     @property
     def start_share(self) -> float:
-        """The same of the start's parameters."""
+        """Position error of the start's parameters at the end by the distance run, rms over the starts."""
         return _share(self.start, self.seconds)
 
     @property

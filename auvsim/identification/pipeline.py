@@ -79,7 +79,7 @@ class Identification:
 
     @property
     def start_share(self) -> float:
-        """The same of the start."""
+        """Position error of the start's parameters on what was held out, by the distance run, rms."""
         return float(np.sqrt(np.mean([judged.start_share**2 for judged in self.judged])))
 
     @property

@@ -38,7 +38,7 @@ class GriddedFloor:
         return (a * (1.0 - t) + b * t) * (1.0 - s) + (c * (1.0 - t) + d * t) * s
 
     def coarse(self, most: int) -> "GriddedFloor":
-        """The same floor on at most so many points along each side, which lie on it."""
+        """The floor on at most so many points along each side, which lie on it."""
         rows, columns = self.depths.shape
         if max(rows, columns) <= most:
             return self

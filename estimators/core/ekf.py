@@ -58,7 +58,7 @@ def correct(
 def correct_iterated(
     belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None, iterations: int = 5
 ) -> tuple[Gaussian, Innovation]:
-    """As `correct`, linearised anew at each result (Gauss-Newton): for ranges as short as their beacon is uncertain.
+    """Corrects, linearised anew at each result (Gauss-Newton): for ranges as short as their beacon is uncertain.
 
     The gate judges the first innovation. The last step's derivative makes the covariance (Bell and Cathey 1993).
     """
@@ -80,7 +80,7 @@ def correct_iterated(
 def correct_second_order(
     belief: Gaussian, measurement: Measurement, model: MeasurementModel, gate: float | None = None
 ) -> tuple[Gaussian, Innovation]:
-    """As `correct`, with the model's second derivatives (Gaussian second-order filter).
+    """Corrects by a measurement with the model's second derivatives (Gaussian second-order filter).
 
     The value expected is larger by half the trace of A P, and its noise by half the trace of A P B P, of the second
     derivatives A and B of two components. Source: Bar-Shalom, Li, Kirubarajan (2001), 10.3.3.
@@ -99,7 +99,7 @@ def correct_second_order(
 def correct_linear(
     belief: Gaussian, H: Array, residual: Array, R: Array, limit: float = math.inf
 ) -> tuple[Gaussian, Innovation]:
-    """As `correct`, with H (m, n), residual (m,) and R (m, m) at hand; `limit` is the largest accepted NIS."""
+    """Corrects by H (m, n), residual (m,) and R (m, m) at hand; `limit` is the largest accepted NIS."""
     mean, covariance, gain, S, nis, status = loops.correct(belief.mean, belief.covariance, H, residual, R, limit)
     if status == loops.NOT_POSITIVE_DEFINITE:
         raise NotPositiveDefiniteError(

@@ -33,7 +33,7 @@ class Outliers:
             raise ParameterError(f"worth {self.worth} of an outliers' prior must lie above 0 measurements")
 
     def after(self, wrong: float, seen: int) -> "Outliers":
-        """The same with the share that measurements since have taught: the mean of the beta distribution of it.
+        """The outliers with the share that measurements since have taught: the mean of its beta distribution.
 
         Args:
             wrong: Sum of the probabilities of those seen that they were outliers.

@@ -82,12 +82,12 @@ class Readmission:
     def suffice(
         self, now: Rejected, rejected: Sequence[Rejected], agreeing: Sequence[Rejected], cautious: bool = False
     ) -> bool:
-        """See `Recovery`."""
+        """Whether enough rejected measurements agree with that of now; it takes one more for the cautious."""
         is_slow = bool(rejected) and now.measurement.stamp - rejected[-1].measurement.stamp >= self._slow
         return len(agreeing) >= (1 if is_slow and now.residual.size > 1 else 2) + cautious
 
     def agreeing(self, now: Rejected, rejected: Sequence[Rejected]) -> list[Rejected]:
-        """See `Recovery`."""
+        """Those rejected before that agree with that of now, the latest first."""
         return [earlier for earlier in reversed(rejected) if self._agree(now, earlier)]
 
     def recover(self, belief: Gaussian, earlier: Rejected, now: Rejected, model: MeasurementModel) -> Gaussian:

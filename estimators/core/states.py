@@ -59,7 +59,7 @@ class StateSpace:
         return Gaussian(mean=self.vector(values), covariance=np.diag(self.vector(deviations) ** 2))
 
     def extended(self, name: str, unit: str) -> "StateSpace":
-        """The same with one state more, at the end."""
+        """The states with one more at the end."""
         if name in self.units:
             raise ParameterError(f"state '{name}' is there already, in {', '.join(self.units)}")
         return StateSpace({**self.units, name: unit}, self.wrapped)

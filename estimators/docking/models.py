@@ -81,7 +81,7 @@ class PlanarModels:
         )
 
     def process_with(self, noise: DockingNoise) -> PlanarProcess:
-        """The same vehicle with other densities of the process noise."""
+        """The vehicle with other densities of the process noise."""
         return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
 
     @property

@@ -43,7 +43,7 @@ def extended(beliefs: Beliefs, z: Array, R: Array, shown: Shown) -> Beliefs:
 
 
 def iterated(beliefs: Beliefs, z: Array, R: Array, shown: Shown, iterations: int = 5) -> Beliefs:
-    """The same linearised anew at each result (Bell and Cathey 1993)."""
+    """Corrections linearised anew at each result (Bell and Cathey 1993)."""
     result = extended(beliefs, z, R, shown)
     for _ in range(iterations - 1):
         expected, H = shown(result.mean)

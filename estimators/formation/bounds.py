@@ -53,7 +53,7 @@ def steady(information: Array, Q: Array) -> Array:
 
 
 def steady_axis(q: float, r: float) -> float:
-    """The same of one axis that is apart from the other: variance of noise q a step, of the measurement r [m^2]."""
+    """Steady bound of one axis that is apart from the other: variance of noise q a step, of the measurement r [m^2]."""
     return (-q + math.sqrt(q * q + 4.0 * q * r)) / 2.0
 
 

@@ -64,7 +64,7 @@ class DeadReckoning(ProcessModel):
 
 
 class AugmentedDeadReckoning(DeadReckoning):
-    """The same as an unscented filter with augmented noise sees it: moments of the inputs' sigma points (kappa = 0).
+    """Dead reckoning as an unscented filter with augmented noise sees it: moments of sigma points (kappa = 0).
 
     The state enters the step by a sum, so sigma points of the state and of the inputs may be taken apart: with a state
     of 2 and 2 inputs there are 8 points besides the centre, 2 standard deviations away. Their mean is shorter than the

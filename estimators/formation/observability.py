@@ -79,7 +79,7 @@ def condition(matrix: Array) -> float:
 
 
 def condition_paper(g: Geometry) -> float:
-    """The same of `paper` in closed form (eq. 17, whose printed quotient is the condition number itself)."""
+    """Condition number of `paper` in closed form (eq. 17, whose printed quotient is the condition number itself)."""
     trace, det = g.count + g.tau, g.s1 + g.tau * g.s2
     root = np.sqrt(max(trace**2 - 4.0 * det, 0.0))
     # (trace - root) / (trace + root), without the difference that cancels where det is small.

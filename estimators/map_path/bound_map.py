@@ -29,7 +29,7 @@ def image_information(image: Array, cell: float, spread: float) -> Array:
 
 
 def height_information(height: Array, cell: float, spread: float, gain: float) -> Array:
-    """As `image_information`, of a height field [m]; `gain` is the echo's change [unit] for a slope of 1."""
+    """Information on the shift in frames of a height field [m]; `gain`: the echo's change [unit] for a slope of 1."""
     smooth = gaussian_filter(np.asarray(height, dtype=float), spread / cell) if spread > 0.0 else height
     north, east = np.gradient(smooth, cell)
     rows = [np.stack(tuple(np.gradient(slope, cell)), axis=-1) for slope in (north, east)]

@@ -40,7 +40,10 @@ def products(values, places, fine, scale, origin_row, origin_column, poses):
 
 @compiled
 def square_differences(values, places, fine, scale, origin_row, origin_column, poses):
-    """As `products`, of squares of the differences instead (paper 5, eq. 4), over the cells that both frames have."""
+    """Sums (k,) of squared differences of `values` (n,) from an upsampled earlier frame (paper 5, eq. 4).
+
+    Arguments as of `products`; over the cells that both frames have.
+    """
     sums = np.zeros(poses.shape[0])
     for k in range(poses.shape[0]):
         c, s = math.cos(poses[k, 2]) * scale, math.sin(poses[k, 2]) * scale

@@ -43,7 +43,7 @@ class FrameModel:
             raise ParameterError(f"{self}: all numbers must be above 0")
 
     def scaled(self, snr: float) -> "FrameModel":
-        """The same at a signal to noise ratio [dB] of a feature's middle cell."""
+        """The likelihood at a signal to noise ratio [dB] of a feature's middle cell."""
         return replace(self, noise=self.amplitude / 10.0 ** (snr / 20.0))
 
 

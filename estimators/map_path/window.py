@@ -184,7 +184,7 @@ def predicted(whole: Gaussian, size: int, process: ProcessModel, u: Input, durat
 
 
 def with_angles(whole: Gaussian, size: int) -> Gaussian:
-    """The same with all headings in (-pi, pi]."""
+    """The poses with all headings in (-pi, pi]."""
     angles = (2, *range(size + 2, whole.mean.size, 3))
     return Gaussian(mean=wrapped(whole.mean, angles), covariance=whole.covariance)
 

@@ -46,6 +46,6 @@ class DeadReckoning:
         return ReckonedState(state.begin, since)
 
     def correct(self, state: ReckonedState, node_time: float, measurements: Sequence[Measurement]) -> ReckonedState:
-        """The same state, since dead reckoning uses nothing."""
+        """Returns the state unchanged, since dead reckoning uses no measurement."""
         refused = tuple((m, NO_MODEL, math.nan) for m in measurements)
         return state._replace(verdicts=(*state.verdicts, *refused))

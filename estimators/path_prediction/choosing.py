@@ -54,7 +54,7 @@ class ChoosingFilter(Follower):
 
     @property
     def leader(self) -> tuple[float, Array] | None:
-        """As the weightier member has it."""
+        """Leader's pose as the member of the larger weight has it."""
         return self.members[self.weight < 0.5].leader
 
     def advance(self, time: float, speed: float, yaw_rate: float) -> None:

@@ -33,7 +33,7 @@ class DelayIgnoringFilter(Follower):
 
     @property
     def leader(self) -> tuple[float, Array] | None:
-        """As the last packet says."""
+        """Leader's pose as the last packet says."""
         return None if self._packet is None else (self._packet.stamp, self._packet.pose[:2])
 
     def hear(self, pulse: Pulse) -> None:

@@ -36,7 +36,7 @@ class DelayedFilter(Follower):
 
     @property
     def leader(self) -> tuple[float, Array] | None:
-        """As the last packet says."""
+        """Leader's pose as the last packet says."""
         return None if self._packet is None else (self._packet.stamp, self._packet.pose[:2])
 
     def advance(self, time: float, speed: float, yaw_rate: float) -> None:

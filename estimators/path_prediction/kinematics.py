@@ -46,7 +46,7 @@ def advance(x, P, at, speed, yaw_rate, duration, speed_density, yaw_density):
 
 @compiled
 def advance_with_speed(x, P, at, acceleration, yaw_rate, duration, acceleration_density, yaw_density):
-    """The same of a pose whose speed is the state after its heading, a random walk with a drift (sec. 4.3)."""
+    """Advances a pose whose speed is the state after its heading, a random walk with a drift (sec. 4.3)."""
     c, s = math.cos(x[at + 2]), math.sin(x[at + 2])
     speed = x[at + 3]
     couple(P, at, at + 3, duration * c)

@@ -64,7 +64,7 @@ def seen(pulse: Pulse, follower: Array, leader: Array) -> Sight | None:
 
 
 def curved(found: Sight, pulse: Pulse, spread: Array) -> Sight:
-    """The same to second order (Bar-Shalom, Li, Kirubarajan 2001, 10.3.2), which a follower needs that is far off.
+    """Sight to second order (Bar-Shalom, Li, Kirubarajan 2001, 10.3.2), which a follower needs that is far off.
 
     Args:
         spread: Covariance (2, 2) of the vector from the follower to the leader.

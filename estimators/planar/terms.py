@@ -44,7 +44,7 @@ class Term(NamedTuple):
 
     @property
     def label(self) -> str:
-        """As files and tables name it, for example `yaw v|r|`."""
+        """Name in files and tables, for example `yaw v|r|`."""
         return f"{AXES[self.axis]} {self.name}"
 
 
@@ -203,7 +203,7 @@ class MotionModel(ProcessModel, Protocol):
         ...
 
     def wrap_angles(self, mean: Array) -> Array:
-        """The same state with its heading in (-pi, pi]."""
+        """The state with its heading in (-pi, pi]."""
         ...
 
 
@@ -264,7 +264,7 @@ class TermsProcess:
         return moved
 
     def wrap_angles(self, mean: Array) -> Array:
-        """The same state with its heading in (-pi, pi]."""
+        """The state with its heading in (-pi, pi]."""
         wrapped = mean.copy()
         wrapped[2] = loops.wrap(wrapped[2])
         return wrapped

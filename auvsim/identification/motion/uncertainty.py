@@ -170,7 +170,7 @@ def held(
 
 
 def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
-    """The same of predictions that are made."""
+    """Errors of predictions, each with its covariance, and what their bands hold, horizon by horizon."""
     alone = Spread(
         noise=np.zeros(3),
         constant=np.zeros(3),

@@ -112,7 +112,7 @@ def simulate(conditions: Conditions, seed: int) -> Run:
 
 
 def in_order(run: Run) -> Run:
-    """The same run with every fix delivered at once."""
+    """The run with every fix delivered at once."""
     fixes = [replace(fix, received=fix.stamp) for fix in run.fixes]
     return replace(run, fixes=tuple(sorted(fixes, key=lambda fix: fix.stamp)))
 

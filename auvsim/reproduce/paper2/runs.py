@@ -78,7 +78,7 @@ class Noise:
 
     @property
     def odometry(self) -> OdometryNoise:
-        """The same as a filter is to assume it."""
+        """The noise of odometry that a filter is to assume."""
         return OdometryNoise(
             forward=self.speed**2,
             starboard=self.sway**2,

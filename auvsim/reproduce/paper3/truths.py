@@ -229,5 +229,5 @@ def _grown(known: Array, own: Array, q: Noise) -> Array:
 
 
 def undelayed(run: Run) -> Run:
-    """The same run with everything heard at once: what the oracle follows."""
+    """The run with everything heard at once: what the oracle follows."""
     return replace(run, events=run.prompt)

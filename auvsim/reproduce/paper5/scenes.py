@@ -145,5 +145,5 @@ def _in_body_axes(features: Array, pose: Array) -> Array:
 
 
 def arc(conditions: Conditions) -> Conditions:
-    """The same on an arc of 1.5 degrees a second."""
+    """The scene on an arc of 1.5 degrees a second."""
     return replace(conditions, turn_rate=math.radians(1.5))

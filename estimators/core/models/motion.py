@@ -85,7 +85,7 @@ def constant_velocity(turning: bool = False) -> Motion:
 
 
 def with_depth(motion: Motion) -> Motion:
-    """The same with depth [m] and its rate of change [m/s]."""
+    """The motion with depth [m] and its rate of change [m/s] as states."""
     space = motion.space.extended("depth", "m").extended("depth_rate", "m/s")
     return replace(
         motion,
@@ -96,7 +96,7 @@ def with_depth(motion: Motion) -> Motion:
 
 
 def with_current(motion: Motion) -> Motion:
-    """The same in a current, a random walk [m/s] that is added to the velocity through the water."""
+    """The motion in a current, a random walk [m/s] that is added to the velocity through the water."""
     space = motion.space.extended("current_north", "m/s").extended("current_east", "m/s")
 
     def rates(x: Symbols, u: Symbols) -> Symbols:
@@ -108,7 +108,7 @@ def with_current(motion: Motion) -> Motion:
 
 
 def with_error(motion: Motion, name: str, unit: str, time_constant: float | None = None) -> Motion:
-    """The same with one more state that only sensors show: a bias, a scale, a lag, the depth of the floor.
+    """The motion with one more state that only sensors show: a bias, a scale, a lag, the depth of the floor.
 
     A random walk, constant if its noise is zero; with a `time_constant` [s] it decays (a Gauss-Markov process).
     """
@@ -126,7 +126,7 @@ def with_error(motion: Motion, name: str, unit: str, time_constant: float | None
 
 
 def with_input_error(motion: Motion, given: str, kind: Literal["bias", "scale"]) -> Motion:
-    """The same with the error of an input as a state: what is given is (1 + scale) true + bias.
+    """The motion with the error of an input as a state: what is given is (1 + scale) true + bias.
 
     The state is called `<input>_bias`, in the input's unit, or `<input>_scale`.
 

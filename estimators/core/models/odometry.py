@@ -52,7 +52,7 @@ class Displacement(NamedTuple):
     def extended(
         self, forward: float, starboard: float, heading: float, dt: float, noise: OdometryNoise
     ) -> "Displacement":
-        """The same and `dt` [s] more, at speeds through the water [m/s] and a heading [rad] that are held."""
+        """The odometry and `dt` [s] more of it, at speeds through the water [m/s] and a heading [rad] that are held."""
         c, s = math.cos(heading), math.sin(heading)
         dn, de = (forward * c - starboard * s) * dt, (forward * s + starboard * c) * dt
         ahead, aside = (noise.forward + noise.position) * dt, (noise.starboard + noise.position) * dt
