@@ -9,6 +9,7 @@ from auvsim.base.reading import Reading
 from auvsim.control.controller import Setpoints
 from auvsim.data.log import VehicleLog
 from auvsim.data.variables import Table
+from auvsim.missions.fixes import FixSource
 from auvsim.navigation.estimate import Estimate
 from auvsim.physics.truth import StructurePose
 from auvsim.vehicles.library import Structure, Vehicle
@@ -58,6 +59,7 @@ class MissionSetup:
     usbl: bool = True  # whether a dock reports where it lies
     ranges: tuple[str, ...] = ()  # names of the sensors that measure ranges to beacons
     altimeters: tuple[str, ...] = ()  # names of those that measure the range to the sea floor
+    fixes: tuple[FixSource, ...] = ()  # what tells where it is
 
 
 class Metric(NamedTuple):

@@ -15,6 +15,7 @@ from auvsim.control import registry as controllers
 from auvsim.control.controller import ControllerSetup
 from auvsim.data.variables import PAYLOAD, Group, Table, Variable, vehicle_groups
 from auvsim.missions import registry as missions
+from auvsim.missions.fixes import FixSource, fix_sources
 from auvsim.missions.mission import Mission, MissionSetup, Place, Situation
 from auvsim.navigation import registry as estimators
 from auvsim.navigation.estimate import Estimate, estimator_events
@@ -105,6 +106,7 @@ class Agent:
                 usbl=self.serves,
                 ranges=tuple(of_kind(dict(on_board(settings.sensors)), RangeSettings)),
                 altimeters=tuple(of_kind(dict(on_board(settings.sensors)), AltimeterSettings)),
+                fixes=self._fixes(plan, places),
             ),
         )
         setup = navigator_setup(plan, name, vehicle)
@@ -150,6 +152,12 @@ class Agent:
         self._received = f"vehicles/{name}/received"
         groups = ("estimate", "measurements", "mission", "command")
         self._estimates, self._measurements, self._decisions, self._commands = (f"vehicles/{name}/{g}" for g in groups)
+
+    def _fixes(self, plan: Scenario, places: Mapping[str, Place]) -> tuple[FixSource, ...]:
+        sensors = plan.vehicles[self.name].sensors
+        dock = places.get(self.dock or "") if self.serves else None
+        served = (sensors.usbl, (dock.pose.north, dock.pose.east, dock.pose.depth)) if dock else None
+        return fix_sources((found for _, found in on_board(sensors)), served, plan.network.acoustics)
 
     def blame(self, error: BaseException) -> BaseException:
         """What to raise in place of an error from within this agent: a user's own part is named."""

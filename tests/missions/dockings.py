@@ -15,7 +15,7 @@ DOCK_DEPTH = 12.0
 PERIOD = 0.1  # of control [s]
 
 
-def new(settings: DockingSettings = SETTINGS, north: float = 0.0, east: float = 0.0) -> Docking:
+def new(settings: DockingSettings = SETTINGS, north: float = 0.0, east: float = 0.0, sources=()) -> Docking:
     """A docking at its beginning; only what guidance knows of vehicle and dock is there."""
     structure: Any = SimpleNamespace(mouth_radius=MOUTH, latched=LATCHED)
     vehicle: Any = SimpleNamespace(nose=NOSE)
@@ -23,6 +23,7 @@ def new(settings: DockingSettings = SETTINGS, north: float = 0.0, east: float = 
     setup = MissionSetup(
         name="auv", settings=settings, vehicle=vehicle, heading=0.0, depth=5.0, period=PERIOD,
         holds=lambda speed: True, structures={"dock": Place(name="dock", pose=pose, structure=structure)},
+        fixes=tuple(sources),
     )  # fmt: skip
     return Docking(setup)
 

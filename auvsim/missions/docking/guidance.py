@@ -25,8 +25,10 @@ from auvsim.missions.docking.relative import Locator, Relative
 from auvsim.missions.docking.settings import DockingSettings, Phase
 from auvsim.missions.docking.speeds import approach_course
 from auvsim.missions.docking.target import find_dock
+from auvsim.missions.docking.weave import NEEDED, STRAIGHT, Leg, Weave, least_weave, miss_deviation, prior_of
 from auvsim.missions.line_of_sight import course_to_line, cross_track, heading_for_course
 from auvsim.missions.mission import Event, Mission, MissionSetup, Situation
+from auvsim.navigation.estimate import Estimate
 
 __all__ = ["CLEAR", "Docking", "DockingSettings", "Phase", "approach_course", "find_dock"]
 
@@ -62,6 +64,7 @@ class Docking(Mission):
         self._mouth_radius, self._latched = self.dock.structure.mouth_radius, self.dock.structure.latched
         pose = self.dock.pose
         self._locator = Locator((pose.north, pose.east), setup.vehicle.nose, setup.period)
+        self._fixes, self._weave = setup.fixes, STRAIGHT  # what tells where it is; the weave that is flown
         self._limit = math.radians(settings.heading_limit_deg)
         self._fastest = speeds.fastest(setup.holds)
         self.phase = Phase.SEARCH
@@ -164,6 +167,11 @@ class Docking(Mission):
             self._side = math.copysign(1.0, here.cross)
         if self.phase in (Phase.HOMING, Phase.GO_AROUND):
             heading, depth, speed, rudder = self._homing(time, here)
+            if self._s.weave and self.phase == Phase.APPROACH:
+                self._weave = self._planned_weave(estimate, here)
+                if self._weave.amplitude:
+                    text = f"{self._weave.amplitude:.1f} m to both sides of the line"
+                    self.events.append(Event(time, "weave", text))
         else:
             reason = self._reason_to_break_off(time, here)
             heading, depth, speed, rudder = self._break_off(time, here, reason) if reason else self._follow_line(here)
@@ -262,7 +270,23 @@ class Docking(Mission):
         speed, line = self._speed(here), self._line(here)
         # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
         error = cross_track(line, here.north, here.east)
-        return self._on_course(here, course_to_line(line, error, self._s.lookahead), speed)
+        offset, slope = self._weave.at(here.north * math.cos(line) + here.east * math.sin(line))
+        course = course_to_line(line + math.atan(slope), error - offset, self._s.lookahead)
+        return self._on_course(here, course, speed)
+
+    def _planned_weave(self, estimate: Estimate, here: Relative) -> Weave:
+        """The weave of an approach that begins."""
+        assert self.dock is not None
+        s, line, pose = self._s, self._line(here), self.dock.pose
+        begin = here.north * math.cos(line) + here.east * math.sin(line)
+        leg = Leg(
+            line, here.axis, (pose.north, pose.east, pose.depth), begin, -s.final_distance, self._speed(here),
+            here.current, s.lookahead,
+        )  # fmt: skip
+        prior = prior_of(estimate)
+        return least_weave(
+            leg, s.weave, self._mouth_radius / NEEDED, lambda weave: miss_deviation(leg, weave, self._fixes, prior)
+        )
 
     def _reason_to_break_off(self, time: float, here: Relative) -> str | None:
         """What is wrong with this attempt; enters the last metres when they begin."""

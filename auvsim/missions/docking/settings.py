@@ -47,6 +47,11 @@ class DockingSettings(Settings):
         default=16.0, gt=0, description="of the tightest turn, for the room to turn round before the dock [m]"
     )
     lookahead: float = Field(default=7.0, gt=0, description="lookahead of the line of sight [m]")
+    weave: float = Field(
+        default=0.0,
+        ge=0,
+        description="widest weave on an approach, flown as wide as the bound of the miss needs; 0: straight [m]",
+    )
     heading_limit_deg: float = Field(
         default=20.0,
         gt=0,
