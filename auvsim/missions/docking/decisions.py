@@ -58,9 +58,16 @@ def above_or_below(below: float) -> str:
     return f"{abs(below):.1f} m {'below' if below > 0.0 else 'above'} the dock"
 
 
-def not_ready(here: Relative, distance: float, settings: DockingSettings) -> str | None:
-    """What an approach from a gate at a distance [m] lacks; None: nothing."""
-    if not depth_within_reach(here, distance, math.radians(settings.descent_deg)):
+def not_ready(here: Relative, distance: float, way: float, settings: DockingSettings) -> str | None:
+    """What an approach from a gate lacks; None: nothing.
+
+    Args:
+        here: The vehicle.
+        distance: Of the gate before the mouth [m].
+        way: From there to the mouth through the water [m]: longer against a current, shorter with one.
+        settings: Of the docking.
+    """
+    if not depth_within_reach(here, way, math.radians(settings.descent_deg)):
         return above_or_below(here.below)
     largest = 1.0 + 0.1 * distance
     if here.cross_deviation > largest:

@@ -59,7 +59,10 @@ class DockingSettings(Settings):
         description="largest angle between heading and dock axis before the line is turned instead [deg]",
     )
     descent_deg: float = Field(
-        default=12.0, gt=0, lt=45, description="slope that the vehicle can be trusted to dive or climb at [deg]"
+        default=6.0,
+        gt=0,
+        lt=45,
+        description="slope through the water that the vehicle can be trusted to hold at the approach's speed [deg]",
     )
     final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
     attempts: int = Field(default=3, ge=1, le=1000, description="attempts before the vehicle gives up")
