@@ -13,7 +13,7 @@ from estimators.core.errors import ParameterError
 from estimators.core.filter import OUTLIER, Start, of_source, without
 from estimators.core.history import Input, Node
 from estimators.core.outliers import MixtureUpdate, Outliers
-from estimators.core.recovery import PROBABLE, REMEMBERED, Recovery, Rejected
+from estimators.core.recovery import PROBABLE, REMEMBERED, Recovery, Rejected, opened
 from estimators.core.types import (
     NO_MODEL,
     Array,
@@ -28,6 +28,8 @@ from estimators.core.types import (
 
 SHORTEST = 0.1  # time between measurements that counts at least, so that no mode ever dies out [s]
 APART = 2.0  # time between two measurements from which a velocity may be told [s]
+DOUBT = 0.1  # probability that a settled filter is right though three agree against it, as an echo and an outlier may
+EVEN = 0.5  # the same where many were rejected that do not agree
 MIN_ACCEPTED = 3  # measurements accepted before two that agree with each other no longer suffice to correct the filter
 
 
@@ -61,7 +63,9 @@ class InteractingModelFilter:
     it allows. Other kinds say nothing of the modes and are fused in each.
 
     A filter that takes good measurements for outliers, because it is wrong itself, is set right by measurements that
-    agree against it: by two if it has taken fewer than three, as after a wrong first one, else by three.
+    agree against it: by two if it has taken fewer than three, as after a wrong first one, else by three. Wrong ones may
+    agree, too, so that in the latter case what it believed before stays in the covariance as the other hypothesis until
+    the next measurement decides. Where many were rejected and none agree, both hypotheses are as likely.
 
     Args:
         processes: One of each mode; all have the same states.
@@ -161,14 +165,21 @@ class InteractingModelFilter:
         if is_wrong or (own and innovation.nis > chi_square(PROBABLE, innovation.residual.size)):
             now = _rejected(state, fix, model, modes, innovation)
             agreeing = self._recovery.agreeing(now, own)
-            enough = self._recovery.suffice(now, own, agreeing, state.accepted >= MIN_ACCEPTED)
+            settled = state.accepted >= MIN_ACCEPTED
+            enough = self._recovery.suffice(now, own, agreeing, settled)
             lasts = bool(own) and fix.stamp - own[0].measurement.stamp >= self._echo
             if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED and lasts):
-                earlier = own[-1] if not agreeing else _apart(now, agreeing) if self._echo else agreeing[0]
-                beliefs = (self._recovery.recover(state.belief, earlier, now, model),) * len(modes)
+                if enough:
+                    earlier = _apart(now, agreeing) if self._echo else agreeing[0]
+                    corrected = self._recovery.recover(state.belief, earlier, now, model)
+                else:
+                    corrected = ekf.correct(opened(state.belief, now.H, now.residual), fix, model)[0]
+                doubt = (DOUBT if settled else 0.0) if enough else EVEN
+                both = imm.merge((corrected, state.belief), np.array((1.0 - doubt, doubt)), self._angles)
+                beliefs = (both,) * len(modes)
                 verdicts = (*state.verdicts, (fix, "", innovation.nis))
-                if self._recovery.fuses_both:
-                    verdicts += tuple(found.taken for found in agreeing or (earlier,))
+                if enough and self._recovery.fuses_both:
+                    verdicts += tuple(found.taken for found in agreeing)
                     count -= len(agreeing)
                 wrong = max(wrong - p - len(agreeing), 0.0)
                 return InteractingState(

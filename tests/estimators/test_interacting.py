@@ -141,9 +141,10 @@ def test_follows_a_truth_that_jumps(jump):
     moved = replace(with_fixes(run, fixes), states=states)
     errors = track(moved, InteractingFilter(PRESTERO)).errors(moved)
     after = [math.ceil(fix.received / TICK) for fix in moved.fixes if fix.stamp >= 75.0]
-    # From the third on it knows that it was wrong, and from the fifth on the current again, which a small jump had been
-    # taken for in part.
-    assert errors[after[2] :].max() < 3.0
+    # From the third on it holds with 0.9 that it was wrong, from the fourth on it knows, and from the fifth on the current
+    # again, which a small jump had been taken for in part.
+    assert errors[after[2] :].max() < 3.0 + 0.1 * math.hypot(jump, jump)
+    assert errors[after[3] :].max() < 3.0
     assert errors[after[4] :].max() < 1.0
 
 
@@ -219,3 +220,34 @@ def test_three_wrong_fixes_in_a_row_do_not_overturn_a_settled_filter():
     tracked = track(with_fixes(run, wrong), InteractingFilter(PRESTERO))
     assert tracked.errors(run)[100:].max() < 1.5  # 20 s without a good fix, the current known to some cm/s
     assert tracked.refused["outlier"] == 3
+
+
+def worst_nees(run, tracked, span):
+    """The largest NEES of the position per degree of freedom in a span of ticks."""
+    error, covariance = (tracked.means - run.states)[span, :2], tracked.covariances[span, :2, :2]
+    return (np.einsum("ki,kij,kj->k", error, np.linalg.inv(covariance), error) / 2.0).max()
+
+
+@pytest.mark.parametrize(
+    ("offsets", "worst"),
+    [
+        # Three that agree against it: their hypothesis has 0.9, and an error of the other 0.1 is 0.9^2 / (0.9 * 0.1) = 9
+        # squared deviations of both together, over two degrees of freedom.
+        ({15: (14.0, 4.0), 16: (19.0, 5.5), 17: (24.0, 7.0)}, 4.5),
+        # Five of which no two agree: both have 0.5, and the error is one deviation.
+        ({15: (30.0, 0.0), 16: (-30.0, 8.0), 17: (0.0, 33.0), 18: (-5.0, -31.0), 19: (40.0, 25.0)}, 0.5),
+    ],
+)
+def test_wrong_fixes_that_overturn_a_filter_leave_room_for_what_it_was_sure_of(offsets, worst):
+    run = simulate(Conditions(duration=150.0), 8)
+    last = max(offsets)
+    wrong = [shifted(fix, offsets[fix.sequence]) if fix.sequence in offsets else fix for fix in run.fixes]
+    tracked = track(with_fixes(run, wrong), InteractingFilter(PRESTERO))
+    overturned, next_one = (
+        math.ceil(next(f.received for f in run.fixes if f.sequence == k) / TICK) for k in (last, last + 1)
+    )
+    errors = tracked.errors(run)
+    assert errors[overturned:next_one].min() > 10.0  # overturned it was
+    # Half as much again for the spread of either hypothesis: without the other one it is above 1000.
+    assert worst_nees(run, tracked, slice(overturned, next_one)) < 1.5 * worst
+    assert errors[next_one:].max() < 1.5  # the next good one decides

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 
 from auvsim.missions.docking import path, speeds
-from auvsim.missions.docking.decisions import PredictedMiss, depth_within_reach, predicted_miss
+from auvsim.missions.docking.decisions import PredictedMiss, depth_within_reach, not_ready, predicted_miss
 from auvsim.missions.docking.relative import Locator, Relative
+from auvsim.missions.docking.settings import DockingSettings
 from auvsim.navigation.estimate import COMPASS_BIAS, DEPTH_BIAS, DOCK_HEADING_BIAS, PLANAR_STATES, Estimate
 
 CRAB = math.radians(22.0)
@@ -134,3 +135,10 @@ def test_current_of_an_estimate_without_one() -> None:
     for _ in range(10):
         here = locator.locate(0.0, over_ground, 0.0, 12.0, 0.0, 12.0)
     assert here.current == pytest.approx((0.3, -0.2))
+
+
+def test_an_approach_waits_for_depth_by_the_way_through_the_water() -> None:
+    """From a gate 200 m off 15 m are flown out; with a following current that leaves 120 m of water, 9 m at most."""
+    settings = DockingSettings(descent_deg=6.0)
+    assert not_ready(at(below=-15.0), 200.0, 200.0, settings) is None
+    assert not_ready(at(below=-15.0), 200.0, 120.0, settings) == "15.0 m above the dock"

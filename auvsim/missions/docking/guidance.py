@@ -235,7 +235,9 @@ class Docking(Mission):
             return self._on_course(here, path.course_to(here, abeam), speed)
         away = math.hypot(here.along - gate[0], here.cross - gate[1])
         if self._waits_for or away < self._s.gate_radius:
-            self._waits_for = not_ready(here, distance, self._way_through_water(here, min(distance, -here.along)), self._s) or ""
+            self._waits_for = (
+                not_ready(here, distance, self._way_through_water(here, min(distance, -here.along)), self._s) or ""
+            )
             if not self._waits_for and away < 2.0 * self._s.gate_radius:
                 hopeless = self._too_strong(here)
                 if hopeless:
