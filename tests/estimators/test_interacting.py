@@ -141,8 +141,8 @@ def test_follows_a_truth_that_jumps(jump):
     moved = replace(with_fixes(run, fixes), states=states)
     errors = track(moved, InteractingFilter(PRESTERO)).errors(moved)
     after = [math.ceil(fix.received / TICK) for fix in moved.fixes if fix.stamp >= 75.0]
-    # From the third on it holds with 0.9 that it was wrong, from the fourth on it knows, and from the fifth on the current
-    # again, which a small jump had been taken for in part.
+    # From the third on it holds with 0.9 that it was wrong; from the fourth on it knows, and from the fifth on the
+    # current again, which a small jump had been taken for in part.
     assert errors[after[2] :].max() < 3.0 + 0.1 * math.hypot(jump, jump)
     assert errors[after[3] :].max() < 3.0
     assert errors[after[4] :].max() < 1.0
@@ -231,8 +231,8 @@ def worst_nees(run, tracked, span):
 @pytest.mark.parametrize(
     ("offsets", "worst"),
     [
-        # Three that agree against it: their hypothesis has 0.9, and an error of the other 0.1 is 0.9^2 / (0.9 * 0.1) = 9
-        # squared deviations of both together, over two degrees of freedom.
+        # Three that agree against it: their hypothesis has 0.9, and an error of the other 0.1 is
+        # 0.9^2 / (0.9 * 0.1) = 9 squared deviations of both together, over two degrees of freedom.
         ({15: (14.0, 4.0), 16: (19.0, 5.5), 17: (24.0, 7.0)}, 4.5),
         # Five of which no two agree: both have 0.5, and the error is one deviation.
         ({15: (30.0, 0.0), 16: (-30.0, 8.0), 17: (0.0, 33.0), 18: (-5.0, -31.0), 19: (40.0, 25.0)}, 0.5),
