@@ -222,8 +222,8 @@ def show_motion(found: MotionIdentification, planar: Identification | None = Non
     for heading in ("structure", "step", "error [%]", "standard error", ""):
         candidates.add_column(heading)
     for c in found.choice.candidates:
-        mark = "chosen" if c is found.choice.chosen else "" if c.converged else "not converged"
-        candidates.add_row(c.structure.name, c.step, f"{100 * c.error:.2f}", f"{100 * c.deviation:.2f}", mark)
+        own = f"{100 * c.error:.2f}", f"{100 * c.deviation:.2f}", found.choice.mark(c)
+        candidates.add_row(c.structure.name, c.step, *own)
     console.print(candidates)
     if not found.better:
         console.print(f"! no {files.NAME} written: going on as it began predicts as well", soft_wrap=True)

@@ -22,7 +22,8 @@ UNITS: dict[str, dict[str, float]] = {  # by kind of quantity; the first is SI, 
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0, "h": 3600.0},
     "angle": {"rad": 1.0, "deg": _DEG},
     "turning": {"rad/s": 1.0, "deg/s": _DEG, "deg/min": _DEG / 60.0},
-    "shaft": {"rad/s": 1.0, "rpm": math.pi / 30.0, "rps": 2.0 * math.pi, "hz": 2.0 * math.pi, "deg/s": _DEG},
+    # Per cent of the largest stays what it is: a coefficient then counts by that.
+    "shaft": {"rad/s": 1.0, "%": 1.0, "rpm": math.pi / 30.0, "rps": 2.0 * math.pi, "hz": 2.0 * math.pi, "deg/s": _DEG},
     "speed": {"m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3, "km/h": 1.0 / 3.6, "kn": 1852.0 / 3600.0},
     "length": {"m": 1.0, "cm": 1e-2, "km": 1e3, "nmi": 1852.0},
     "place": {"deg": 1.0, "rad": 1.0 / _DEG},  # of latitude and longitude, kept in degrees
@@ -54,6 +55,20 @@ QUANTITIES: dict[str, Quantity] = {
     "shaft_speed": Quantity(
         "shaft", "shaft_speed shaft n rpm propeller propeller_speed prop prop_speed thruster", "shaft propeller"
     ),
+    "shaft_port": Quantity(
+        "shaft",
+        "shaft_port port_shaft n_port port_n port_rpm rpm_port thruster_port port_thruster shaft_left n_left "
+        "left_rpm rpm_left thruster_left left_thruster port_propeller propeller_port",
+        "shaft propeller",
+    ),
+    "shaft_starboard": Quantity(
+        "shaft",
+        "shaft_starboard starboard_shaft n_starboard starboard_n starboard_rpm rpm_starboard n_stbd stbd_rpm "
+        "rpm_stbd thruster_starboard starboard_thruster shaft_right n_right right_rpm rpm_right thruster_right "
+        "right_thruster starboard_propeller propeller_starboard",
+        "shaft propeller",
+    ),
+    "side_thruster": Quantity("shaft", "side_thruster bow_thruster tunnel_thruster lateral_thruster thruster_bow", ""),
     "heading": Quantity("angle", "heading psi yaw compass hdg compass_heading yaw_angle", "compass imu ahrs"),
     "yaw_rate": Quantity("turning", "yaw_rate r gyro gyro_z heading_rate rate_of_turn rot yawrate", "gyro imu ahrs"),
     "surge": Quantity("speed", "surge u stw speed_through_water water_surge dvl_water_u u_water", "dvl log"),

@@ -98,10 +98,11 @@ def part(record: Record, first: int, stop: int) -> Record:
     """Samples `first` to `stop` of a record."""
     times, rows = record.times[first:stop], slice(first, stop)
     name = f"{record.name}, {times[0]:.0f} to {times[-1]:.0f} s"
-    wind = None if record.wind is None else record.wind[rows]
+    wind, thrusters = (None if values is None else values[rows] for values in (record.wind, record.thrusters))
     return replace(
-        record, name=name, times=times, inputs=record.inputs[rows], measured=record.measured[rows], wind=wind
-    )
+        record, name=name, times=times, inputs=record.inputs[rows], measured=record.measured[rows], wind=wind,
+        thrusters=thrusters,
+    )  # fmt: skip
 
 
 def judge(record: Record, start: PlanarParameters, fit: PlanarParameters) -> HoldoutResult:

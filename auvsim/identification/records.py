@@ -23,6 +23,8 @@ class Record:
     current: Array | None = None  # (2,) north, east [m/s] where it is known; None: a nuisance parameter of the record
     kind: str = ""  # of the manoeuvre, where it is known
     wind: Array | None = None  # (n, 2) apparent wind, air past the vehicle towards its bow and to starboard [m/s]
+    # (n, 2) half of what the port shaft is faster than the starboard one, a side thruster's speed [rad/s]
+    thrusters: Array | None = None
 
     @property
     def step(self) -> float:

@@ -14,6 +14,7 @@ from estimators.core.types import Array
 
 INPUTS = ("rudder", "shaft_speed")
 WIND = ("wind_forward", "wind_starboard")
+THRUSTERS = ("shaft_difference", "side_thruster")
 SHORTEST = 10.0  # spans shorter than this hold less than the vehicle's own time constants [s]
 MOST_STEPS = 1e7  # of a record; a hundred times those of a day at 1 Hz
 GAP = 1.0  # missing inputs this long split a record; more slowly sampled ones at three of their intervals [s]
@@ -162,9 +163,13 @@ def _gridded(signals: Signals, start: float, stop: float, step: float, name: str
             measured[:, c], count = _moved(given[quantity], times, step)
             deviations[c] = signals.deviation(quantity) / math.sqrt(count)
     wind = np.column_stack([_means(given[axis], times, step) for axis in WIND]) if WIND[0] in given else None
+    thrusters = None
+    if set(THRUSTERS) & given.keys():
+        still = np.zeros(len(times))
+        thrusters = np.column_stack([_means(given[t], times, step) if t in given else still for t in THRUSTERS])
     return Record(
         name=name, times=times, inputs=inputs, measured=measured, deviations=deviations,
-        current=signals.current, kind=signals.kind, wind=wind,
+        current=signals.current, kind=signals.kind, wind=wind, thrusters=thrusters,
     )  # fmt: skip
 
 

@@ -21,6 +21,7 @@ from estimators.core.types import Array
 
 EARTH = 6_371_000.0  # mean radius [m]
 NEEDED = ("time", "rudder", "shaft_speed")
+TWO = {"shaft_port", "shaft_starboard"}
 _EXAMPLES = {
     "time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]", "heading or yaw_rate": "heading [deg]",
 }  # fmt: skip
@@ -71,14 +72,22 @@ def signals(
     }
     if not shaft and inputs and "shaft_speed" not in by_quantity:
         constants.setdefault("shaft_speed", 0.0)
-    _require(path, by_quantity.keys() | constants.keys(), described, NEEDED if inputs else NEEDED[:1])
+    there = by_quantity.keys() | constants.keys()
+    twin = there >= TWO
+    if twin and "shaft_speed" not in by_quantity:
+        constants.pop("shaft_speed", None)
+        there |= {"shaft_speed"}
+    steered = bool({"rudder", "rudder_command"} & there)
+    _require(path, there | ({"rudder"} if twin else set()), described, NEEDED if inputs else NEEDED[:1])
     time, said = stamps.seconds(columns, by_quantity["time"], path)
     for quantity, meaning in by_quantity.items():
         checks.not_empty(columns[meaning.column].values, quantity, meaning.column, path)
     columns, placed = places.degrees(columns, by_quantity, path)
     table = _Table(path, columns, by_quantity, constants, time - np.nanmin(time), float(np.nanmin(time)))
     notes = [*read, *said, *placed, *_assumptions(table, unknown)]
-    if inputs and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
+    if inputs and twin and not steered:
+        notes.append(f"{path.name}: no rudder: its two shafts steer")
+    if inputs and not twin and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
         notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
     found = []
     pieces = list(_pieces(table))
@@ -239,6 +248,12 @@ def _combine(found: dict[str, Signal]) -> None:
     """Puts what goes by other names under those of a record."""
     if "rudder" not in found and "rudder_command" in found:
         found["rudder"] = found["rudder_command"]
+    if found.keys() >= TWO:
+        port, starboard = found["shaft_port"], found["shaft_starboard"]
+        other = np.interp(port.times, starboard.times, starboard.values)
+        found["shaft_speed"] = replace(port, values=0.5 * (port.values + other))
+        found["shaft_difference"] = replace(port, values=0.5 * (port.values - other))
+        found.setdefault("rudder", replace(port, values=0.0 * port.values))
     if {"velocity_north", "velocity_east", "heading"} <= found.keys() and "ground_surge" not in found:
         north, east, heading = (found[name] for name in ("velocity_north", "velocity_east", "heading"))
         across = np.interp(north.times, east.times, east.values)

@@ -2,8 +2,9 @@
 
 A structure is a selection of the terms: Nomoto's, the planar model's own, Abkowitz' and MMG-like ones, wind. The
 coefficients are accelerations by their term [SI], so that no mass need be known; u, v are velocities through the water.
-Input (rudder [rad], positive to starboard; shaft speed [rad/s]; apparent wind, the velocity of the air past the
-vehicle, towards its bow and to starboard [m/s]).
+Input (rudder [rad], positive to starboard; shaft speed, of two shafts their mean [rad/s]; apparent wind, the velocity
+of the air past the vehicle, towards its bow and to starboard [m/s]; half of what the port shaft is faster than the
+starboard one, and a side thruster's speed, positive where it pushes to starboard [rad/s]).
 """
 
 import math
@@ -22,7 +23,7 @@ from estimators.core.kernels import step_kernels
 from estimators.core.types import Array, ProcessModel
 from estimators.planar.model import MAX_SUBSTEP, PlanarParameters
 
-INPUTS = 4
+INPUTS = 6
 
 
 class _Motion(NamedTuple):
@@ -33,6 +34,22 @@ class _Motion(NamedTuple):
     n: ca.SX  # shaft speed
     a: ca.SX  # apparent wind towards the bow
     b: ca.SX  # and to starboard
+    w: ca.SX  # half the difference of the shafts, port less starboard
+    t: ca.SX  # side thruster
+
+    @property
+    def thrust(self) -> ca.SX:
+        """Mean of n|n| of both shafts."""
+        return (_signed_square(self.n + self.w) + _signed_square(self.n - self.w)) / 2
+
+    @property
+    def turning(self) -> ca.SX:
+        """Half the difference of n|n| of both shafts."""
+        return (_signed_square(self.n + self.w) - _signed_square(self.n - self.w)) / 2
+
+
+def _signed_square(x: ca.SX) -> ca.SX:
+    return x * ca.fabs(x)
 
 
 class Term(NamedTuple):
@@ -58,14 +75,14 @@ _SURGE: dict[str, Callable[[_Motion], ca.SX]] = {
     "vv": lambda m: m.v**2,
     "uudd": lambda m: (m.u * m.d) ** 2,
     "nndd": lambda m: (m.n * m.d) ** 2,
-    "n|n|": lambda m: m.n * ca.fabs(m.n),
-    "|n|u": lambda m: ca.fabs(m.n) * m.u,
+    "n|n|": lambda m: m.thrust,
+    "|n|u": lambda m: (ca.fabs(m.n + m.w) + ca.fabs(m.n - m.w)) / 2 * m.u,
     "wind": lambda m: m.a * ca.sqrt(m.a**2 + m.b**2 + 1e-12),
 }
 _LATERAL: dict[str, Callable[[_Motion], ca.SX]] = {
     "1": lambda m: ca.SX(1),
     "uu": lambda m: m.u**2,
-    "n|n|": lambda m: m.n * ca.fabs(m.n),
+    "n|n|": lambda m: m.thrust,
     "v": lambda m: m.v,
     "r": lambda m: m.r,
     "uv": lambda m: m.u * m.v,
@@ -80,9 +97,13 @@ _LATERAL: dict[str, Callable[[_Motion], ca.SX]] = {
     "rrr": lambda m: m.r**3,
     "d": lambda m: m.d,
     "uud": lambda m: m.u**2 * m.d,
-    "n|n|d": lambda m: m.n * ca.fabs(m.n) * m.d,
+    "n|n|d": lambda m: m.thrust * m.d,
     "nud": lambda m: m.n * m.u * m.d,
     "wind": lambda m: m.b * ca.sqrt(m.a**2 + m.b**2 + 1e-12),
+    "twin n|n|": lambda m: m.turning,
+    "twin |n|u": lambda m: (ca.fabs(m.n + m.w) - ca.fabs(m.n - m.w)) / 2 * m.u,
+    "t|t|": lambda m: m.t * ca.fabs(m.t),
+    "t|t|u": lambda m: m.t * ca.fabs(m.t) * m.u,
 }
 _YAW = {**_LATERAL, "wind ab": lambda m: m.a * m.b}
 TERMS = tuple(
@@ -146,10 +167,12 @@ STRUCTURES = (  # from the simplest
 PLANAR = tuple(dict.fromkeys((*STRUCTURES[2].terms, *STRUCTURES[3].terms)))  # what PlanarParameters can hold
 ASYMMETRY = ("sway 1", "sway uu", "sway n|n|", "yaw 1", "yaw uu", "yaw n|n|")
 WIND = ("surge wind", "sway wind", "yaw wind", "yaw wind ab")
+TWIN = ("sway twin n|n|", "sway twin |n|u", "yaw twin n|n|", "yaw twin |n|u")  # of two shafts
+THRUSTER = ("sway t|t|", "sway t|t|u", "yaw t|t|", "yaw t|t|u")  # at the side
 
 
 def accelerations(nu: ca.SX, inputs: ca.SX, coefficients: ca.SX) -> ca.SX:
-    """Accelerations (3,) of nu = [u, v, r] under inputs (4,) [m/s^2, rad/s^2].
+    """Accelerations (3,) of nu = [u, v, r] under inputs (6,) [m/s^2, rad/s^2].
 
     Beyond its limit a velocity counts as the limit, and comes back: sums of quadratic and cubic terms that were fitted
     to smaller velocities may drive the vehicle there, which no water does.
@@ -290,7 +313,7 @@ def vector(coefficients: dict[str, float]) -> Array:
 
 
 def _inputs(u: Sequence[float]) -> tuple[float, ...]:
-    """All four inputs; without wind it is calm."""
+    """All inputs; those that are not given are none: no wind, one shaft, no thruster."""
     return (*(float(value) for value in u), *(0.0 for _ in range(INPUTS - len(u))))
 
 

@@ -8,7 +8,7 @@ Only NumPy. Yaw rate and heading clockwise, sway to starboard; a positive rudder
 """
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -30,6 +30,14 @@ class Sea(NamedTuple):
     lag: float = 0.5  # of velocities behind positions and heading [s]
     filtered: float = 0.5  # time constant of the filter on what is logged as velocity [s]
     noise: float = 1.0  # factor on the sensors' noise
+
+
+class Ship(NamedTuple):
+    """Equations of a ship, and how it goes."""
+
+    slope: Callable[[np.ndarray, float, float, np.ndarray, np.ndarray], np.ndarray]  # see the tanker's
+    speed: float  # of the approach [m/s]
+    shaft: float  # at that [rad/s]
 
 
 class Run(NamedTuple):
@@ -99,9 +107,12 @@ CALM = Sea()
 KINDS = ("zigzag10", "zigzag20", "steps", "turns", "multisine", "steps slow")
 
 
+TANKER = Ship(slope, SPEED, SHAFT)
+
+
 def _order(kind: str, t: float, state: dict, x: np.ndarray, tables: Mapping[str, np.ndarray]) -> tuple[float, float]:
-    """Rudder and shaft ordered [rad, rad/s]."""
-    shaft = SHAFT * float(tables["shaft"][int(t // 40.0) % len(tables["shaft"])])
+    """Rudder [rad], and shaft by that of the approach."""
+    shaft = float(tables["shaft"][int(t // 40.0) % len(tables["shaft"])])
     if kind.startswith("zigzag"):
         angle = math.radians(float(kind[6:]))
         side = state.setdefault("side", 1.0)
@@ -117,7 +128,7 @@ def _order(kind: str, t: float, state: dict, x: np.ndarray, tables: Mapping[str,
     return math.radians(float(tables["steps"][int(t // hold) % len(tables["steps"])])), shaft
 
 
-def sail(kind: str, seed: int, sea: Sea = CALM, duration: float = 300.0, step: float = 0.2) -> Run:
+def sail(kind: str, seed: int, sea: Sea = CALM, duration: float = 300.0, step: float = 0.2, ship: Ship = TANKER) -> Run:
     """Sails a manoeuvre and logs it every `step` seconds."""
     generator = np.random.default_rng([seed, KINDS.index(kind)])
     tables = {
@@ -128,16 +139,16 @@ def sail(kind: str, seed: int, sea: Sea = CALM, duration: float = 300.0, step: f
     count = round(duration / FINE) + 1
     push = np.column_stack([_slow(generator, count, FINE, sea.disturbance * f, 15.0) for f in (1, 1, 2 / LENGTH)])
     gusts = np.column_stack([_slow(generator, count, FINE, sea.gust, 8.0) for _ in range(2)])
-    x = np.array([0.0, 0.0, generator.uniform(-math.pi, math.pi), SPEED * 0.9, 0.0, 0.0])
-    rudder, shaft, state = 0.0, SHAFT, {}
+    x = np.array([0.0, 0.0, generator.uniform(-math.pi, math.pi), ship.speed * 0.9, 0.0, 0.0])
+    rudder, shaft, state = 0.0, ship.shaft, {}
     states, inputs, winds = np.empty((count, 6)), np.empty((count, 2)), np.array(sea.wind) + gusts
     for k in range(count):
         ordered, wanted = _order(kind, k * FINE, state, x, tables)
         rudder += np.clip(ordered - rudder, -FINE * math.radians(12.0), FINE * math.radians(12.0))
-        shaft += (wanted - shaft) * FINE / 2.0
+        shaft += (ship.shaft * wanted - shaft) * FINE / 2.0
         states[k], inputs[k] = x, (rudder, shaft)
-        middle = x + 0.5 * FINE * slope(x, rudder, shaft, winds[k], push[k])
-        x = x + FINE * slope(middle, rudder, shaft, winds[k], push[k])
+        middle = x + 0.5 * FINE * ship.slope(x, rudder, shaft, winds[k], push[k])
+        x = x + FINE * ship.slope(middle, rudder, shaft, winds[k], push[k])
     return _logged(kind, states, inputs, winds, sea, generator, round(step / FINE))
 
 

@@ -1,8 +1,12 @@
-"""Which structure, by which step: compared by cross-validation, one standard error towards the simpler.
+"""Which structure, by which step: compared by cross-validation; the average of the good ones, or the simplest of them.
 
 Records, or where they are few their parts, are left out in turn; what was left out is predicted open loop from many
 starts. Structures are compared after least squares and after segments first, then the best with more terms and by all
 steps.
+
+Few records rank candidates by chance as much as by merit. So those that come near the best are averaged, each by the
+inverse of its mean square, unless what was left out speaks against it: the errors of candidates differ, and their mean
+has less of them than most (Bates and Granger, Operational Research Quarterly 20, 1969).
 """
 
 import math
@@ -12,16 +16,19 @@ from itertools import pairwise
 
 import numpy as np
 
+from auvsim.identification.motion import data
 from auvsim.identification.motion import fit as fits
 from auvsim.identification.motion.data import Motion, slices
-from auvsim.identification.motion.fit import STEPS, MotionFit, Regression
+from auvsim.identification.motion.fit import AVERAGE, HORIZON, STEPS, MotionFit, Regression
 from auvsim.identification.motion.rollout import horizons, rms, roll
 from estimators.core.types import Array
-from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS, WIND, Structure
+from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS, THRUSTER, TWIN, WIND, Structure
 
-HORIZON = 60.0  # of the predictions that decide [s]
 FOLDS = 4
-KEPT = 2  # structures that go on to all steps
+NEAR = 2.0  # times the least error, up to which candidates are averaged
+# By what share an average may be worse than the simplest good candidate: the best of twenty looks better than it is.
+LUCK = 0.1
+KEPT = 4  # structures that go on to all steps
 EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
 # Records from which on whole ones are left out, and asymmetry may be chosen. Within a record it cannot be told from
 # constant errors of its sensors and from its current: it predicts other parts of the record well, and nothing else.
@@ -61,11 +68,21 @@ class Choice:
     """What was compared, and what was kept."""
 
     candidates: tuple[Candidate, ...]  # from the best
-    chosen: Candidate
+    chosen: Candidate  # an average, or the simplest good one
+    alone: Candidate  # the simplest good one
+    averaged: tuple[Candidate, ...]  # what the average is of
     horizon: float  # [s]
     fit: MotionFit  # of the chosen one, to all of the data
     said: str  # how it was left out
     folds: "Folds"
+
+    def mark(self, candidate: Candidate) -> str:
+        """What became of a candidate, in a word or two."""
+        if candidate is self.chosen:
+            return "chosen"
+        if not candidate.converged:
+            return "not converged"
+        return "averaged" if self.chosen.step == AVERAGE and candidate in self.averaged else ""
 
 
 class Folds:
@@ -82,6 +99,7 @@ class Folds:
         self.whole = fits.regression(self.motions, before)
         self.horizon = min(HORIZON, horizons([m for _, out in self.splits for m in out], (HORIZON,))[-1])
         self._fits: dict[tuple[tuple[str, ...], str, int], MotionFit] = {}
+        self._averaged: list[tuple[Candidate, float]] = []  # and the weight of each
 
     def fit(self, structure: Structure, step: str, fold: int) -> MotionFit:
         """A fit without one part; of the whole with the fold -1."""
@@ -96,11 +114,15 @@ class Folds:
     def _made(
         self, structure: Structure, step: str, fold: int, motions: Sequence[Motion], equations: Regression
     ) -> MotionFit:
+        if step == AVERAGE:
+            parts = [self.fit(c.structure, c.step, fold) for c, _ in self._averaged]
+            return fits.average(parts, [weight for _, weight in self._averaged])
         if step == STEPS[0]:
             return fits.least_squares(motions, structure, equations)
-        guess = self.fit(structure, STEPS[STEPS.index(step) - 1], fold)
         like = self.fit(structure, step, -1) if fold >= 0 else None
-        return fits.segments(motions, guess, step, equations, like=like)
+        before = STEPS[: STEPS.index(step)] if like is None else (like.begun,)
+        guesses = [self.fit(structure, earlier, fold) for earlier in before]
+        return fits.segments(motions, guesses, step, equations, like=like)
 
     def candidate(self, structure: Structure, step: str) -> Candidate:
         """Fits without each part, and their predictions of it."""
@@ -116,6 +138,13 @@ class Folds:
         return Candidate(
             structure=structure, step=step, shares=tuple(shares), deviation=deviation, converged=converged
         )  # fmt: skip
+
+    def average(self, candidates: Sequence[Candidate]) -> Candidate:
+        """Their average, by the inverse of their mean squares."""
+        self._averaged = [(candidate, candidate.error**-2) for candidate in candidates]
+        labels = {term for candidate in candidates for term in candidate.structure.terms}
+        terms = tuple(label for label in LABELS if label in labels)
+        return self.candidate(Structure(name=f"average of {len(candidates)}", terms=terms), AVERAGE)
 
 
 def choose(
@@ -137,14 +166,20 @@ def choose(
     """
     say = progress or (lambda text, share: None)
     folds = Folds(motions, before)
-    windy = any(np.any(motion.record.inputs[:, 2:]) for motion in motions)
-    bases = [seen(folds.whole, with_terms(structure, WIND if windy else ())) for structure in structures]
+    inputs = np.concatenate([motion.record.inputs for motion in motions])
+    windy = bool(np.any(inputs[:, data.WIND]))
+    added = [TWIN] * bool(np.any(inputs[:, 4])) + [THRUSTER] * bool(np.any(inputs[:, 5])) + [WIND] * windy
+    bases = []
+    for structure in structures:
+        for terms in added:
+            structure = with_terms(structure, terms)
+        bases.append(seen(folds.whole, structure))
     found: list[Candidate] = []
     first = FIRST_STEPS[:1] if quick else FIRST_STEPS
     for number, structure in enumerate(bases):
         say(f"cross-validation: {structure.name}", 0.5 * number / len(bases))
         found += [folds.candidate(structure, step) for step in first]
-    if windy:  # a docking filter knows no wind
+    if added and TWIN not in added:  # a docking filter's planar model knows none of these, and steers by a rudder
         calm = [seen(folds.whole, structure) for structure in structures if set(structure.terms) <= set(PLANAR)]
         found += [folds.candidate(structure, FIRST_STEPS[0]) for structure in calm]
     best = _ranked(found)[0].structure
@@ -160,11 +195,14 @@ def choose(
         for step in steps:
             say(f"{structure.name}: {step}", 0.7 + 0.25 * number / len(last))
             found.append(folds.candidate(structure, step))
-    ranked = _ranked(found)
-    chosen = simplest(ranked)
+    chosen = alone = simplest(_ranked(found))
+    near = [c for c in _ranked(found) if c.converged and c.error <= NEAR * alone.error]
+    if len(near) > 1:
+        found.append(folds.average(near))
+        chosen = found[-1] if found[-1].error <= (1.0 + LUCK) * alone.error else alone
     return Choice(
-        candidates=tuple(ranked), chosen=chosen, horizon=folds.horizon, said=folds.said, folds=folds,
-        fit=folds.fit(chosen.structure, chosen.step, -1),
+        candidates=tuple(_ranked(found)), chosen=chosen, alone=alone, averaged=tuple(near), horizon=folds.horizon,
+        said=folds.said, folds=folds, fit=folds.fit(chosen.structure, chosen.step, -1),
     )  # fmt: skip
 
 
@@ -188,7 +226,7 @@ def with_terms(structure: Structure, terms: Sequence[str]) -> Structure:
     """A structure with more terms."""
     if not terms:
         return structure
-    names = {WIND: "wind", ASYMMETRY: "asymmetry"}
+    names = {WIND: "wind", ASYMMETRY: "asymmetry", TWIN: "two shafts", THRUSTER: "side thruster"}
     chosen = {*structure.terms, *terms}
     return Structure(
         name=f"{structure.name} and {names.get(tuple(terms), 'more')}", terms=tuple(t for t in LABELS if t in chosen)

@@ -13,10 +13,10 @@ from auvsim.identification.motion.lags import Lags
 from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.states import STEADY, smoothed
 from estimators.core.types import Array
-from estimators.planar.terms import INPUTS
 
 COARSEST = 0.25  # step of the grid [s]: a small vehicle's yaw takes about a second
 QUICK = 0.5  # the same where speed counts more [s]
+WIND, THRUSTERS = slice(2, 4), slice(4, 6)  # of the inputs
 WATER = [MEASURED.index(name) for name in ("surge", "sway")]
 GROUND = [MEASURED.index(name) for name in ("north", "east", "ground_surge", "ground_sway")]
 
@@ -25,7 +25,7 @@ GROUND = [MEASURED.index(name) for name in ("north", "east", "ground_surge", "gr
 class Motion:
     """A record on its grid, and the motion that its sensors show without any model of the vehicle."""
 
-    record: Record  # inputs (n, 4) with the apparent wind; sensors' lags taken out
+    record: Record  # inputs (n, 6) as `terms` has them; sensors' lags taken out
     states: Array  # (n, 12) smoothed; see `states`
 
     @property
@@ -60,7 +60,7 @@ def prepare(records: Sequence[Record], *, coarsest: float = COARSEST, known: Lag
     own = nuisances(records).vector()
     found = []
     for record in records:
-        ready = _coarser(_with_wind(lags.without(record, known)), coarsest)
+        ready = _coarser(_with_all_inputs(lags.without(record, known)), coarsest)
         found.append(Motion(record=ready, states=smoothed(ready, STEADY, own)))
     return found
 
@@ -70,9 +70,10 @@ def slices(motion: Motion, first: int, stop: int) -> Motion:
     return Motion(record=part(motion.record, first, stop), states=motion.states[first:stop])
 
 
-def _with_wind(record: Record) -> Record:
-    wind = np.zeros((len(record.times), INPUTS - 2)) if record.wind is None else record.wind
-    return replace(record, inputs=np.column_stack([record.inputs[:, :2], wind]))
+def _with_all_inputs(record: Record) -> Record:
+    still = np.zeros((len(record.times), 2))
+    others = [still if values is None else values for values in (record.wind, record.thrusters)]
+    return replace(record, inputs=np.column_stack([record.inputs[:, :2], *others]))
 
 
 def _coarser(record: Record, coarsest: float) -> Record:
@@ -103,5 +104,6 @@ def _coarser(record: Record, coarsest: float) -> Record:
         inputs=inputs,
         measured=measured,
         deviations=record.deviations / np.sqrt(np.maximum(dense, 1.0)),
-        wind=None if record.wind is None else inputs[:, 2:],
+        wind=None if record.wind is None else inputs[:, WIND],
+        thrusters=None if record.thrusters is None else inputs[:, THRUSTERS],
     )

@@ -14,11 +14,13 @@ from auvsim.identification.fit import invert
 from auvsim.identification.motion import engine
 from auvsim.identification.motion.data import Motion, nuisances
 from auvsim.identification.motion.dimensions import UNSURE
+from auvsim.identification.motion.rollout import horizons, rms, roll
 from auvsim.identification.segment_problem import Point, Problem, SegmentOptions, minimise
 from estimators.core.types import Array
 from estimators.planar.terms import LABELS, LIMITS, TERMS, Structure, vector
 
 STEPS = ("least squares", "segments of 20 s", "segments of 60 s", "output error")
+AVERAGE = "average"  # of several structures and steps
 LENGTHS = {"segments of 20 s": 20.0, "segments of 60 s": 60.0}  # [s]; else whole records
 WINDOW = 2.0  # over which changes of velocity are taken [s]
 WIDE = 5.0  # of the weak prior: a term alone may make so many times the rms of its axis' change of velocity
@@ -26,6 +28,8 @@ WIDE = 5.0  # of the weak prior: a term alone may make so many times the rms of 
 # their squares counts 1.2 to 1.7 L times what it is worth (the ratio of its blocks' gradients to its curvature).
 ALIKE = 1.5  # [1/s]
 START = np.array([0.3, 0.3, 0.02, 0.03, 0.03, 0.01])  # deviations of first states about smoothed ones [m, rad, m/s]
+HORIZON = 60.0  # of the predictions that decide [s]
+ITERATIONS = 30  # at most, of each round of a search
 THRESHOLD = 3.0  # of Huber's loss, in deviations: what a few stretches cannot explain does not decide
 FORGET = 0.2  # share of the last step's information that the next one, which sees the same data, keeps
 ROUNDS = 2  # of deviations from residuals
@@ -48,7 +52,7 @@ class MotionFit:
     """Coefficients of a structure."""
 
     structure: Structure
-    step: str  # of STEPS
+    step: str  # of STEPS, or AVERAGE
     values: Array  # (k,) in the order of the structure's terms
     information: Array  # (k, k) of the weighted least squares with the prior, nuisances eliminated
     blocks: tuple[tuple[Array, Array], ...]  # (k, k) and (k,): information and gradient of each stretch of the data
@@ -57,8 +61,10 @@ class MotionFit:
     limits: Array  # (3,) of surge, sway and yaw rate [m/s, rad/s]
     converged: bool
     iterations: int
+    begun: str = ""  # by which step's fit the search began; least squares begin at nothing
     held: Array | None = None  # (k, k) the information if the nuisances were known; None: there are none
     worth: float = 1.0  # by what the information overstates the data, see ALIKE
+    known: Array | None = None  # (k, k) covariance of an average; else `covariance` finds it
 
     @property
     def vector(self) -> Array:
@@ -168,64 +174,120 @@ def least_squares(motions: Sequence[Motion], structure: Structure, equations: Re
 
 def segments(
     motions: Sequence[Motion],
-    guess: MotionFit,
+    guesses: Sequence[MotionFit],
     step: str,
     equations: Regression | None = None,
     *,
     like: MotionFit | None = None,
-    max_iterations: int = 30,
 ) -> MotionFit:
     """Fits the motion over segments from where another fit of the structure ended.
 
-    The prior is the weak one, and where the last step ended, with a share of its information: so coefficients that go
+    It begins at that guess whose free run over the segments is the likeliest. So a structure that cannot follow the
+    motion, whose fit to shorter segments gave up one channel for another, does not lead the longer ones astray.
+    Deviations are found from residuals, first with the guess's; where that does not converge, or predicts the data
+    worse than the guess, also with larger ones, by the guess's free run, and the better fit is kept.
+
+    The prior is the weak one, and where the guess ended, with a share of its information: so coefficients that go
     together do not leave each other where the longer segments see only their sum. Both count by what the sum of squares
     is worth.
 
     Args:
         motions: What was measured.
-        guess: Where it begins; its deviations too if it came of segments.
+        guesses: Fits by the steps before, the last one last.
         step: Of STEPS, but the first.
         equations: Those of the motions; they are made if None.
-        like: A fit of the same structure and step to more data: the search begins there, with its deviations. None: it
-            begins at the guess, and deviations are found from residuals.
-        max_iterations: Of each round.
+        like: A fit of the same structure and step to more data: the search begins there, with its deviations, and the
+            prior is of the guess by the same step. None: deviations are found from residuals.
     """
-    structure = guess.structure
     found = regression(motions) if equations is None else equations
-    length = LENGTHS.get(step, np.inf)
-    worth = ALIKE * min(length, max(motion.duration for motion in motions))
-    centre = guess.vector
-    prior = np.diag(1.0 / reach(found, structure) ** 2) + FORGET * guess.information / guess.worth
-    own = nuisances([motion.record for motion in motions])
-    options = SegmentOptions(nuisances=own, max_iterations=max_iterations, loss="huber", threshold=THRESHOLD)
-    rounds = 1 if like is not None else ROUNDS
-    deviations, values, used = (like or guess).deviations, (like or guess).values, 0
-    point = problem = None
-    converged = False
+    if like is not None:
+        guess = next(fit for fit in guesses if fit.step == like.begun)
+        return _searched(motions, guess, like.values, like.deviations, step, found, rounds=1)
+    sensors = guesses[0].deviations
+    runs = [(guess, _free_run(_problem(motions, guess, sensors, step, found), guess.values)) for guess in guesses]
+    guess, run = min(runs, key=lambda pair: _unlikely(pair[1], sensors))
+    wide = _from_residuals(run, sensors) if np.isfinite(run.cost) else sensors
+    tried = [wide] if guess.step == STEPS[0] else [guess.deviations, np.sqrt(guess.deviations * wide)]
+    asked, fits = off(motions, guess), []
+    for deviations in tried:
+        fits.append(_searched(motions, guess, guess.values, deviations, step, found, rounds=ROUNDS))
+        if fits[-1].converged and off(motions, fits[-1]) <= asked:
+            break
+    return min(fits, key=lambda fit: (not fit.converged, off(motions, fit)))
+
+
+def off(motions: Sequence[Motion], fit: MotionFit) -> float:
+    """Position error of open-loop predictions of motions after HORIZON by the distance run, rms."""
+    at = horizons(motions, (HORIZON,))
+    return float(rms([roll(fit.vector, motion, at).shares for motion in motions])[-1])
+
+
+def _problem(motions: Sequence[Motion], guess: MotionFit, deviations: Array, step: str, found: Regression) -> Problem:
+    """The segments' sum of squares with these deviations, and a prior about a guess."""
+    records = [replace(motion.record, deviations=deviations) for motion in motions]
+    weak = np.diag(1.0 / reach(found, guess.structure) ** 2)
+    options = SegmentOptions(
+        nuisances=nuisances([motion.record for motion in motions]), max_iterations=ITERATIONS, loss="huber",
+        threshold=THRESHOLD,
+    )  # fmt: skip
+    return Problem(
+        records, Coefficients(guess.vector), guess.structure.terms, options, LENGTHS.get(step, np.inf),
+        [motion.states for motion in motions], engine.EQUATIONS,
+        _worth(motions, step) * (weak + FORGET * guess.information / guess.worth), START,
+    )  # fmt: skip
+
+
+def _worth(motions: Sequence[Motion], step: str) -> float:
+    return ALIKE * min(LENGTHS.get(step, np.inf), max(motion.duration for motion in motions))
+
+
+def _searched(
+    motions: Sequence[Motion],
+    guess: MotionFit,
+    values: Array,
+    deviations: Array,
+    step: str,
+    found: Regression,
+    rounds: int,
+) -> MotionFit:
+    """The way down from some values, with deviations from residuals after each round but the last."""
+    point, problem, converged, used = None, _problem(motions, guess, deviations, step, found), False, 0
+    worth = _worth(motions, step)
     for turn in range(rounds):
-        records = [replace(motion.record, deviations=deviations) for motion in motions]
-        problem = Problem(
-            records, Coefficients(centre), structure.terms, options, length, [motion.states for motion in motions],
-            engine.EQUATIONS, worth * prior, START,
-        )  # fmt: skip
-        starts = [cut.held for cut in problem.cuts] if point is None else point.starts
-        first = problem.at(values, problem.nuisances if point is None else point.nuisances, starts)
+        if point is None:
+            first = _free_run(problem, values)
+        else:
+            problem = _problem(motions, guess, deviations, step, found)
+            first = problem.at(point.values, point.nuisances, point.starts)
         if not np.isfinite(first.cost):
             break
         # Deviations that are no more than guessed do not merit a way to its end.
         tolerance = _TOLERANCE * worth if turn == rounds - 1 else 0.1 * worth
         point, iterations, converged = minimise(problem, first, tolerance)
-        values, used = point.values, used + iterations
+        used += iterations
         deviations = _from_residuals(point, deviations)
-    if point is None or problem is None:
-        return replace(guess, step=step, converged=False)
+    if point is None:
+        return replace(guess, step=step, begun=guess.step, converged=False)
     total, _, _ = problem.reduced(point, 0.0)
-    k = len(values)
+    k = len(point.values)
     return MotionFit(
-        structure=structure, step=step, values=values, information=_without_nuisances(total, k),
+        structure=guess.structure, step=step, values=point.values, information=_without_nuisances(total, k),
         blocks=tuple(_blocks(problem, point)), deviations=deviations, currents=point.nuisances[:, :2],
-        limits=guess.limits, converged=converged, iterations=used, held=total[:k, :k], worth=worth,
+        limits=guess.limits, converged=converged, iterations=used, begun=guess.step, held=total[:k, :k], worth=worth,
     )  # fmt: skip
+
+
+def _free_run(problem: Problem, values: Array) -> Point:
+    """The segments from the smoothed states at their beginnings."""
+    return problem.at(values, problem.nuisances, [cut.held for cut in problem.cuts])
+
+
+def _unlikely(point: Point, deviations: Array) -> float:
+    """Less the logarithm of the likelihood of residuals whose deviations are the likeliest, but for a constant."""
+    if not np.isfinite(point.cost):
+        return np.inf
+    counts = np.isfinite(np.concatenate(point.residuals)).sum(axis=0)
+    return float(counts @ np.log(_from_residuals(point, deviations)))
 
 
 def _from_residuals(point: Point, deviations: Array) -> Array:
@@ -256,6 +318,33 @@ def _blocks(problem: Problem, point: Point) -> list[tuple[Array, Array]]:
     return found
 
 
+def average(parts: Sequence[MotionFit], weights: Sequence[float]) -> MotionFit:
+    """The weighed mean of fits to the same data; a term that one lacks is zero there.
+
+    Its covariance is the mean of theirs and the spread between them (Hoeting et al., Statistical Science 14, 1999, eq.
+    2), as if each knew nothing of the others.
+
+    Args:
+        parts: The fits.
+        weights: Of each, in any unit.
+    """
+    share = np.array(weights) / np.sum(weights)
+    terms = tuple(label for label in LABELS if any(label in fit.structure.terms for fit in parts))
+    values, spread = np.zeros((len(parts), len(terms))), np.zeros((len(terms), len(terms)))
+    for row, fit, weight in zip(values, parts, share, strict=True):
+        own = [terms.index(term) for term in fit.structure.terms]
+        row[own] = fit.values
+        spread[np.ix_(own, own)] += weight * covariance(fit)
+    mean = share @ values
+    spread += np.einsum("p,pi,pj->ij", share, values - mean, values - mean)
+    first = parts[int(np.argmax(share))]
+    return replace(
+        first, structure=Structure(name=f"average of {len(parts)}", terms=terms), step=AVERAGE, values=mean,
+        information=np.linalg.pinv(spread), blocks=(), converged=all(fit.converged for fit in parts), held=None,
+        known=spread,
+    )  # fmt: skip
+
+
 def covariance(fit: MotionFit) -> Array:
     """Covariance (k, k) of the coefficients by the jackknife of stretches of the data.
 
@@ -263,6 +352,8 @@ def covariance(fit: MotionFit) -> Array:
     that are neither white nor of the size believed. Where stretches are few it is no smaller than that of the weighted
     least squares itself.
     """
+    if fit.known is not None:
+        return fit.known
     H = fit.information if fit.held is None else fit.held
     # What the currents of the records leave unknown besides: they are eliminated from all stretches at once.
     wider = np.sqrt(np.diag(invert(fit.information)) / np.diag(invert(H)))

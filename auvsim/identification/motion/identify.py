@@ -10,7 +10,7 @@ from auvsim.base.errors import InputError
 from auvsim.identification.motion import data, fit, lags
 from auvsim.identification.motion.choice import Candidate, Choice, choose
 from auvsim.identification.motion.dimensions import Dimensions, coefficients
-from auvsim.identification.motion.fit import STEPS, MotionFit
+from auvsim.identification.motion.fit import AVERAGE, STEPS, MotionFit
 from auvsim.identification.motion.lags import Lags
 from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence, rms, roll
 from auvsim.identification.motion.uncertainty import Halves, Held, Spread, halves, held, held_of, of_left_out, spread
@@ -37,7 +37,8 @@ class MotionIdentification:
     spread: Spread
     left_out: Held  # predictions of what cross-validation left out
     holdout: Held | None  # predictions of what the user held out
-    steps: tuple[tuple[str, Array], ...]  # of the chosen structure, each step's errors (m,) on what was held out
+    # Of the best structure alone, each step's errors (m,) on what was held out.
+    steps: tuple[tuple[str, Array], ...]
     none: Array  # (m,) errors of a motion that goes on as it began
     halves: Halves
     planar: tuple[Candidate, MotionFit] | None  # the best of those that the planar model can hold
@@ -120,10 +121,10 @@ def identify_motion(
     judging = data.prepare(holdout.records, coarsest=coarsest, known=known) if holdout is not None else []
     before = None if hull is None else coefficients(hull)
     choice = choose(motions, before=before, quick=quick, progress=lambda text, share: say(text, 0.05 + 0.7 * share))
-    chosen, folds = choice.chosen, choice.folds
+    chosen, alone, folds = choice.chosen, choice.alone, choice.folds
     say("disjoint halves", 0.8)
-    before_it = [folds.fit(chosen.structure, step, -1) for step in STEPS[1 : STEPS.index(chosen.step) + 1]]
-    apart = halves(motions, choice.fit, before_it)
+    before_it = [folds.fit(alone.structure, step, -1) for step in STEPS[1 : STEPS.index(alone.step) + 1]]
+    apart = halves(motions, alone.structure, before_it)
     widened = max(1.0, apart.rms**2)
     own = widened * fit.covariance(choice.fit)
     say("bands", 0.85)
@@ -135,9 +136,9 @@ def identify_motion(
     judged = held(choice.fit, judging, own, found, ends) if judging else None
     targets = judging or [m for _, out in folds.splits for m in out]
     steps = tuple(
-        (step, rms([roll(folds.fit(chosen.structure, step, -1).vector, m, ends).shares for m in judging]))
-        for step in STEPS[: STEPS.index(max((c.step for c in choice.candidates), key=STEPS.index)) + 1]
-        if judging
+        (step, rms([roll(folds.fit(alone.structure, step, -1).vector, m, ends).shares for m in judging]))
+        for step in STEPS
+        if judging and any(c.step == step for c in choice.candidates)
     )
     say("done", 1.0)
     speed = float(np.mean([m.states[:, 3].mean() for m in motions]))
@@ -156,7 +157,8 @@ def _check(records: Sequence[Record]) -> None:
             f"{total:.0f} s of data in spans of 10 s or more; a motion model needs {LEAST:g} s at the very least, two "
             "manoeuvres of two minutes each are better"
         )
-    if max(float(np.std(record.inputs[:, 0])) for record in records) < STILL:
+    twin = any(record.thrusters is not None and np.std(record.thrusters) > 0.0 for record in records)
+    if not twin and max(float(np.std(record.inputs[:, 0])) for record in records) < STILL:
         at = math.degrees(float(np.mean(np.concatenate([record.inputs[:, 0] for record in records]))))
         raise InputError(
             f"the rudder stays at {at:.1f} deg throughout: nothing in sway and yaw can be learnt; "
@@ -196,15 +198,25 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
     best = found.choice.candidates[0]
     holds = bool(found.judged.inside[found.place] >= HOLDS)
     said = [(found.better and holds, found.trust)]
-    text = f"chosen: {chosen.structure.name} by {chosen.step} ({len(chosen.structure.terms)} terms)"
-    if best is not chosen:
+    terms = len(chosen.structure.terms)
+    if chosen.step == AVERAGE:
+        count = len(found.choice.averaged)
+        first = found.choice.averaged[0]
+        text = f"chosen: the average of {count} models that predict nearly as well ({terms} terms; {chosen.error:.2%} "
+        text += f"in cross-validation; the best alone, {first.structure.name} by {first.step}, {first.error:.2%})"
+    else:
+        text = f"chosen: {chosen.structure.name} by {chosen.step} ({terms} terms)"
+    if best is not chosen and chosen.step != AVERAGE:
         text += f"; {best.structure.name} by {best.step} is no better by more than chance ({best.error:.2%} against "
         text += f"{chosen.error:.2%})"
     said.append((chosen.converged, text if chosen.converged else f"{text}; it has not converged"))
     good = found.halves.rms <= APART
     text = f"fits to disjoint halves differ by {found.halves.rms:.2g} of their standard deviations, rms"
-    if found.halves.step != chosen.step:
-        text += f" (by {found.halves.step}, for by {chosen.step} they do not converge)"
+    alone = found.choice.alone
+    if chosen.step == AVERAGE:
+        text += f" ({alone.structure.name} by {found.halves.step})"
+    if found.halves.step != alone.step:
+        text += f" (by {found.halves.step}, for by {alone.step} they do not converge)"
     said.append((good, text if good else f"{text}: intervals and bands are widened by it"))
     weak = [
         term for term, value, deviation in zip(chosen.structure.terms, found.fit.values, found.deviations, strict=True)

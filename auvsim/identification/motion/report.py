@@ -70,7 +70,7 @@ def _candidates(found: MotionIdentification) -> list[tuple[str, ...]]:
     return [
         (
             c.structure.name, str(len(c.structure.terms)), c.step, f"{100 * c.error:.2f}", f"{100 * c.deviation:.2f}",
-            "chosen" if c is found.choice.chosen else "" if c.converged else "not converged",
+            found.choice.mark(c),
         )
         for c in found.choice.candidates
     ]  # fmt: skip

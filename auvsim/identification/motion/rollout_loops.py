@@ -20,7 +20,7 @@ def predict(first, begin, marks, inputs, p, free, current, h, substeps, spread):
     Args:
         first, begin: First states (starts, 6) and their samples (starts,).
         marks: Samples after its beginning at which a prediction is read (marks,), increasing.
-        inputs: (n, 4) of the record.
+        inputs: (n, 6) of the record.
         p, free: All coefficients, and the places of those whose sensitivity is wanted (k,).
         current: North, east of each prediction (starts, 2) [m/s].
         h, substeps: Step of the record [s], and of how many it is made.

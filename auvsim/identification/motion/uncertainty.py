@@ -201,15 +201,15 @@ def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
     )
 
 
-def halves(motions: Sequence[Motion], like: MotionFit, steps: Sequence[MotionFit] = ()) -> Halves:
+def halves(motions: Sequence[Motion], structure: Structure, steps: Sequence[MotionFit] = ()) -> Halves:
     """Fits a structure to every other record, or every other part of few records, and to the rest.
 
     Both go as far as both converge: what has run away says nothing of the intervals.
 
     Args:
         motions: All of them.
-        like: The fit to all of them, whose structure it is.
-        steps: Fits to all of them by the steps before it, and itself, from the second on; searches begin there.
+        structure: What is fitted.
+        steps: Fits of it to all of them, by the steps from the second on; searches begin there.
     """
     parts = list(motions)
     if len(parts) < 4:
@@ -220,16 +220,19 @@ def halves(motions: Sequence[Motion], like: MotionFit, steps: Sequence[MotionFit
             parts += [slices(motion, a, b) for a, b in pairwise(edges.tolist())]
     both = [parts[::2], parts[1::2]]
     equations = [fits.regression(half) for half in both]
-    found = [fits.least_squares(half, like.structure, own) for half, own in zip(both, equations, strict=True)]
+    begun = [fits.least_squares(half, structure, own) for half, own in zip(both, equations, strict=True)]
+    found = {begun[0].step: begun}
+    last = begun[0].step
     for whole in steps:
+        if whole.begun not in found:  # by a step whose halves did not converge
+            continue
         further = [
-            fits.segments(half, guess, whole.step, own, like=whole)
-            for half, guess, own in zip(both, found, equations, strict=True)
+            fits.segments(half, [guess], whole.step, own, like=whole)
+            for half, guess, own in zip(both, found[whole.begun], equations, strict=True)
         ]
-        if not all(fit.converged for fit in further):
-            break
-        found = further
-    first, second = found
+        if all(fit.converged for fit in further):
+            found[whole.step], last = further, whole.step
+    first, second = found[last]
     spread = np.diag(fits.covariance(first) + fits.covariance(second))
     scores = (first.values - second.values) / np.sqrt(np.maximum(spread, 1e-300))
     return Halves(scores=scores, rms=float(np.sqrt(np.mean(scores**2))), step=first.step)
