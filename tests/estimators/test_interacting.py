@@ -219,3 +219,20 @@ def test_three_wrong_fixes_in_a_row_do_not_overturn_a_settled_filter():
     tracked = track(with_fixes(run, wrong), InteractingFilter(PRESTERO))
     assert tracked.errors(run)[100:].max() < 1.5  # 20 s without a good fix, the current known to some cm/s
     assert tracked.refused["outlier"] == 3
+
+
+class OneByOne(InteractingFilter):
+    """Whose modes move on one after the other."""
+
+    def __init__(self):
+        super().__init__(PRESTERO, INTERACTING_NOISE)
+        assert self._propagate != self._propagated  # else both are the same
+        self._propagate = self._propagated
+
+
+def test_modes_that_move_on_together_are_the_same_filter():
+    run = simulate(Conditions(duration=120.0, outliers=0.1), 4)
+    together, apart = track(run, InteractingFilter(PRESTERO, INTERACTING_NOISE)), track(run, OneByOne())
+    assert np.isfinite(together.means[-1]).all()
+    assert (together.means[-1] == apart.means[-1]).all()
+    assert (together.covariances[-1] == apart.covariances[-1]).all()
