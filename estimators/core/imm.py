@@ -1,6 +1,7 @@
 """Interacting multiple models: mixing and merging of the beliefs of several modes (Blom and Bar-Shalom 1988)."""
 
 from collections.abc import Sequence
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,19 +21,15 @@ def mix(
         transition: (m, m) probability of changing from mode i (row) to mode j (column).
         angles: States that are angles, kept in (-pi, pi].
     """
-    means, covariances, indices = _stacked(beliefs, angles)
+    means, covariances = stacked(beliefs)
     following = weights @ transition
-    mixed = []
-    for j, weight in enumerate(following):
-        mean, covariance = loops.merge(means, covariances, weights * transition[:, j] / weight, indices)
-        mixed.append(Gaussian(mean=mean, covariance=covariance))
-    return tuple(mixed), following
+    mixed = loops.mix(means, covariances, weights, transition, following, indices(angles))
+    return tuple(Gaussian(mean=x, covariance=P) for x, P in zip(*mixed, strict=True)), following
 
 
 def merge(beliefs: Sequence[Gaussian], weights: Array, angles: tuple[int, ...] = ()) -> Gaussian:
     """The Gaussian that has the mean and the covariance of a mixture of `beliefs` with probabilities `weights`."""
-    means, covariances, indices = _stacked(beliefs, angles)
-    mean, covariance = loops.merge(means, covariances, weights, indices)
+    mean, covariance = loops.merge(*stacked(beliefs), weights, indices(angles))
     return Gaussian(mean=mean, covariance=covariance)
 
 
@@ -42,6 +39,12 @@ def update(weights: Array, log_likelihoods: Sequence[float]) -> Array:
     return shares / shares.sum()
 
 
-def _stacked(beliefs: Sequence[Gaussian], angles: tuple[int, ...]) -> tuple[Array, Array, NDArray[np.int64]]:
-    means, covariances = np.array([b.mean for b in beliefs]), np.array([b.covariance for b in beliefs])
-    return means, covariances, np.array(angles, dtype=np.int64)
+def stacked(beliefs: Sequence[Gaussian]) -> tuple[Array, Array]:
+    """Means (m, n) and covariances (m, n, n) of m beliefs."""
+    return np.array([b.mean for b in beliefs]), np.array([b.covariance for b in beliefs])
+
+
+@lru_cache
+def indices(angles: tuple[int, ...]) -> NDArray[np.int64]:
+    """States that are angles, as compiled loops take them."""
+    return np.array(angles, dtype=np.int64)

@@ -32,18 +32,21 @@ DOUBT = 0.1  # probability that a settled filter is right though three agree aga
 EVEN = 0.5  # the same where many were rejected that do not agree
 MIN_ACCEPTED = 3  # measurements accepted before two that agree with each other no longer suffice to correct the filter
 
+_new = tuple.__new__  # of a state, without the cost of its fields by name
+
 
 class InteractingState(NamedTuple):
     """What a node keeps: each mode's belief and probability, and what is remembered of measurements."""
 
-    beliefs: tuple[Gaussian, ...]
+    means: Array  # (m, n) of the modes' beliefs
+    covariances: Array  # (m, n, n) of them
+    verdicts: Verdicts  # on this node's measurements, and revised ones
     weights: Array  # (m,) probabilities of the modes
     last_fix: float  # stamp of the last measurement that weighed the modes [s]
     accepted: int = 1  # such measurements taken so far
     outliers: int = 0  # those more probably wrong than not, so far
     rejected: tuple[Rejected, ...] = ()
     innovation: Innovation | None = None  # of the last of them, in the mode most probable then
-    verdicts: Verdicts = ()  # on this node's measurements, and revised ones
     angles: tuple[int, ...] = (2,)  # states that are angles
     last_accepted: float = math.nan  # stamp of the last of them that was more probably right [s]
     wrong: float = 0.0  # sum of the probabilities of all of them that they were outliers
@@ -52,7 +55,17 @@ class InteractingState(NamedTuple):
     @property
     def belief(self) -> Gaussian:
         """The modes' beliefs merged."""
-        return imm.merge(self.beliefs, self.weights, self.angles)
+        mean, covariance = loops.merge(self.means, self.covariances, self.weights, imm.indices(self.angles))
+        return Gaussian(mean=mean, covariance=covariance)
+
+    @property
+    def beliefs(self) -> list[Gaussian]:
+        """Those of the modes."""
+        return [Gaussian(mean=x, covariance=P) for x, P in zip(self.means, self.covariances, strict=True)]
+
+    def with_beliefs(self, means: Array, covariances: Array, verdicts: Verdicts) -> "InteractingState":
+        """The same but for means (m, n), covariances (m, n, n) and verdicts: cheaper than `_replace`."""
+        return _new(InteractingState, (means, covariances, verdicts, *self[3:]))
 
 
 class InteractingModelFilter:
@@ -105,6 +118,8 @@ class InteractingModelFilter:
         self._mixtures, self._recovery, self._blended = dict(mixtures), recovery, blended
         self._echo = echo
         self._angles = self._processes[0].angles
+        together = getattr(processes[0], "together", None)
+        self._propagate = (together and together(processes[1:])) or self._propagated
 
     def start(self, nodes: Sequence[Node[InteractingState]], index: int) -> InteractingState | None:
         """State at the first node that suffices; its other measurements are fused."""
@@ -115,18 +130,17 @@ class InteractingModelFilter:
         known = {id(m) for m in used}
         last = max((m.stamp for m in used if m.kind in self._mixtures), default=nodes[index].time)
         verdicts = tuple((m, "", math.nan) for m in used)
-        beliefs = (belief,) * len(self._processes)
+        means, covariances = imm.stacked((belief,) * len(self._processes))
         state = InteractingState(
-            beliefs, self._initial, last, verdicts=verdicts, angles=self._angles, last_accepted=last
+            means, covariances, verdicts, self._initial, last, angles=self._angles, last_accepted=last
         )
         others = [m for m in nodes[index].measurements if id(m) not in known]
         return self.correct(state, nodes[index].time, others)
 
     def predict(self, state: InteractingState, u: Input, duration: float) -> InteractingState:
         """State after `duration` [s]."""
-        modes = zip(state.beliefs, self._processes, strict=True)
-        beliefs = tuple(ekf.predict(belief, process, u, duration) for belief, process in modes)
-        return state._replace(beliefs=beliefs, verdicts=())
+        means, covariances = self._propagate(state.means, state.covariances, u, duration)
+        return state.with_beliefs(means, covariances, ())
 
     def correct(
         self, state: InteractingState, node_time: float, measurements: Sequence[Measurement]
@@ -135,14 +149,14 @@ class InteractingModelFilter:
         for measurement in measurements:
             model = model_of(self.sensors, measurement)
             if model is None:
-                state = state._replace(verdicts=(*state.verdicts, (measurement, NO_MODEL, math.nan)))
+                verdicts = (*state.verdicts, (measurement, NO_MODEL, math.nan))
+                state = state.with_beliefs(state.means, state.covariances, verdicts)
             elif measurement.kind in self._mixtures:
                 state = self._weighed(state, measurement, model)
             else:
-                fused = [ekf.fuse(belief, measurement, model) for belief in state.beliefs]
-                verdict = (measurement, "", fused[int(state.weights.argmax())][1])
-                beliefs = tuple(belief for belief, _ in fused)
-                state = state._replace(beliefs=beliefs, verdicts=(*state.verdicts, verdict))
+                means, covariances, nis = _fused(state, measurement, model)
+                verdict = (measurement, "", nis[int(state.weights.argmax())])
+                state = state.with_beliefs(means, covariances, (*state.verdicts, verdict))
         return state
 
     def process_after(self, state: InteractingState) -> ProcessModel:
@@ -150,6 +164,13 @@ class InteractingModelFilter:
         if self._blended is not None:
             return self._blended(state.weights)
         return self._processes[int(state.weights.argmax())]
+
+    def _propagated(self, means: Array, covariances: Array, u: Input, duration: float) -> tuple[Array, Array]:
+        """Means (m, n) and covariances (m, n, n) of the modes after `duration` [s], one by one."""
+        modes = zip(means, covariances, self._processes, strict=True)
+        return imm.stacked(
+            [ekf.predict(Gaussian(mean=x, covariance=P), process, u, duration) for x, P, process in modes]
+        )
 
     def _weighed(self, state: InteractingState, fix: Measurement, model: MeasurementModel) -> InteractingState:
         mixture = self._mixtures[fix.kind].after(state.wrong, state.seen)
@@ -176,15 +197,15 @@ class InteractingModelFilter:
                     corrected = ekf.correct(opened(state.belief, now.H, now.residual), fix, model)[0]
                 doubt = (DOUBT if settled else 0.0) if enough else EVEN
                 both = imm.merge((corrected, state.belief), np.array((1.0 - doubt, doubt)), self._angles)
-                beliefs = (both,) * len(modes)
+                means, covariances = imm.stacked((both,) * len(modes))
                 verdicts = (*state.verdicts, (fix, "", innovation.nis))
                 if enough and self._recovery.fuses_both:
                     verdicts += tuple(found.taken for found in agreeing)
                     count -= len(agreeing)
                 wrong = max(wrong - p - len(agreeing), 0.0)
                 return InteractingState(
-                    beliefs, self._initial, fix.stamp, 2, count, rejected, innovation, verdicts, self._angles,
-                    fix.stamp, wrong, seen,
+                    means, covariances, verdicts, self._initial, fix.stamp, 2, count, rejected, innovation,
+                    self._angles, fix.stamp, wrong, seen,
                 )  # fmt: skip
             if is_wrong:  # the first of them says when it began, the last ones what it is
                 first = own[:1] if self._echo else own[1 - REMEMBERED : 2 - REMEMBERED]
@@ -193,13 +214,29 @@ class InteractingModelFilter:
             count += is_wrong
         accepted = state.accepted + (not is_wrong)
         transition = loops.transition(self._generator, max(SHORTEST, fix.stamp - state.last_fix))
-        beliefs, weights = imm.mix([mode.belief for mode in modes], weights, transition, self._angles)
+        following = weights @ transition
+        unmixed = imm.stacked([mode.belief for mode in modes])
+        means, covariances = loops.mix(*unmixed, weights, transition, following, imm.indices(self._angles))
         verdicts = (*state.verdicts, (fix, OUTLIER if is_wrong else "", innovation.nis))
         last_accepted = state.last_accepted if is_wrong else fix.stamp
         return InteractingState(
-            beliefs, weights, fix.stamp, accepted, count, rejected, innovation, verdicts, self._angles, last_accepted,
-            wrong, seen,
+            means, covariances, verdicts, following, fix.stamp, accepted, count, rejected, innovation, self._angles,
+            last_accepted, wrong, seen,
         )  # fmt: skip
+
+
+def _fused(
+    state: InteractingState, measurement: Measurement, model: MeasurementModel
+) -> tuple[Array, Array, Sequence[float]]:
+    """Means (m, n), covariances (m, n, n) and NIS of the modes after a measurement that says nothing of them."""
+    if model.is_angle and type(model).covariance is MeasurementModel.covariance:
+        H = model.jacobian(state.means[0], measurement)  # the same everywhere
+        found = loops.correct_angle_each(state.means, state.covariances, H, measurement.value, measurement.covariance)
+        means, covariances, nis, status = found
+        if status == loops.OK:
+            return means, covariances, nis.tolist()
+    fused = [ekf.fuse(belief, measurement, model) for belief in state.beliefs]  # or says what is wrong
+    return *imm.stacked([belief for belief, _ in fused]), [nis for _, nis in fused]
 
 
 def _apart(now: Rejected, agreeing: Sequence[Rejected]) -> Rejected:

@@ -77,6 +77,16 @@ def predict(mean, covariance, u, p, q, duration, substeps):
 
 
 @compiled
+def predict_each(means, covariances, u, p, q, duration, substeps):
+    """`predict` of each of several beliefs (m, n), (m, n, n), with noise of its own (m, n); whether all are finite."""
+    X, P, finite = np.empty_like(means), np.empty_like(covariances), True
+    for k in range(means.shape[0]):
+        X[k], P[k], one = predict(means[k], covariances[k], u, p, q[k], duration, substeps)
+        finite = finite and one
+    return X, P, finite
+
+
+@compiled
 def move(points, u, p, duration, substeps):
     """Carries each of `points` (k, n) on by `duration` with the input held, in place and without wrapping angles."""
     n = points.shape[1]
@@ -146,8 +156,8 @@ def step_kernels(function: ca.Function, wrapped: Sequence[int] = ()) -> ModuleTy
 
     The module has `step(x, u, p, h, x', F)`, which fills its last two arguments (F only where it can differ from zero),
     and `predict(mean, covariance, u, p, q, duration, substeps) -> (mean, covariance, finite)`, where q (n,) holds power
-    spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi]; and `move` and `walk`
-    for many points and for long trajectories, see KERNELS.
+    spectral densities of the process noise and the states `wrapped` are angles kept in (-pi, pi]; and `predict_each`,
+    `move` and `walk` for several beliefs, many points and long trajectories, see KERNELS.
     """
     wrapping = repr((*wrapped,)) if wrapped else "range(0)"
     return _loaded(function, "step", ("x", "u", "p", "h"), ("following", "F"), KERNELS.format(wrapped=wrapping))

@@ -132,6 +132,20 @@ def correct_angle(mean, covariance, H, value, R):
 
 
 @compiled
+def correct_angle_each(means, covariances, H, value, R):
+    """`correct_angle` of each of several beliefs (m, n), (m, n, n): their means, covariances, NIS (m,) and status.
+
+    The status is OK, or that of the first belief which cannot be corrected; the others are then not looked at.
+    """
+    X, P, nis = np.empty_like(means), np.empty_like(covariances), np.empty(means.shape[0])
+    for k in range(means.shape[0]):
+        X[k], P[k], nis[k], status = correct_angle(means[k], covariances[k], H, value, R)
+        if status != OK:
+            return X, P, nis, status
+    return X, P, nis, OK
+
+
+@compiled
 def joseph(covariance, HP, H, K, R):
     """(I - K H) P (I - K H)' + K R K', made of products of size n m only."""
     n, m = K.shape
@@ -183,6 +197,15 @@ def merge(means, covariances, weights, angles):
     for index in angles:
         mean[index] = wrap(mean[index])
     return mean, P
+
+
+@compiled
+def mix(means, covariances, weights, transition, following, angles):
+    """Moments of each mode (m, n), (m, n, n) after changes of mode by `transition` (m, m), to probabilities (m,)."""
+    X, P = np.empty_like(means), np.empty_like(covariances)
+    for j in range(weights.size):
+        X[j], P[j] = merge(means, covariances, weights * transition[:, j] / following[j], angles)
+    return X, P
 
 
 @compiled

@@ -7,7 +7,7 @@ Prestero (2001).
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import lru_cache
 from types import ModuleType, SimpleNamespace
@@ -169,16 +169,20 @@ def planar_kernels(*, current: bool = True, integrator: Integrator = "midpoint",
 def is_warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> bool:
     """Whether a filter on this model starts at once; if not, its first use compiles for some seconds."""
     kernels = planar_kernels(current=current, integrator=integrator, biases=biases)
-    return all(map(is_ready, (kernels.predict, loops.correct, loops.correct_angle)))
+    compiled = (kernels.predict, kernels.predict_each, loops.correct, loops.correct_angle, loops.correct_angle_each)
+    return all(map(is_ready, compiled))
 
 
 def warm(*, current: bool = True, integrator: Integrator = "midpoint", biases: Biases = ()) -> None:
     """Compiles what a filter on this model needs, or loads it from the cache on disk."""
     n = 8 + len(biases) if current else 6
     process = PlanarProcess(PRESTERO, np.zeros(n), integrator=integrator, biases=biases)
+    kernels = planar_kernels(current=current, integrator=integrator, biases=biases)
     mean, covariance, _ = process.propagate(np.zeros(n), np.eye(n), (0.0, 0.0), 0.1)
     loops.correct(mean, covariance, np.eye(1, n), np.zeros(1), np.eye(1), math.inf)
     loops.correct_angle(mean, covariance, np.eye(1, n), np.zeros(1), np.eye(1))
+    each = kernels.predict_each(mean[None], covariance[None], (0.0, 0.0), process._p, process.noise[None], 0.1, 1)
+    loops.correct_angle_each(*each[:2], np.eye(1, n), np.zeros(1), np.eye(1))
     loops.wrap(0.0)
 
 
@@ -217,6 +221,7 @@ class PlanarProcess(ProcessModel):
         self._max_substep = max_substep
         kernels = planar_kernels(current=self.noise.size >= 8, integrator=integrator, biases=biases)
         self._predict, self._step, self._move, self._walk = kernels.predict, kernels.step, kernels.move, kernels.walk
+        self._predict_each = kernels.predict_each
 
     def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """State after `dt` [s] with the input (rudder [rad], shaft speed [rad/s]) held."""
@@ -247,6 +252,29 @@ class PlanarProcess(ProcessModel):
         if not finite:
             raise NotFiniteError(f"prediction over {dt:g} s from {mean} with input {u} is not finite")
         return x, P, substeps
+
+    def together(self, others: Sequence[ProcessModel]) -> Callable[..., tuple[Array, Array]] | None:
+        """One compiled call for `propagate` of this process and of others that differ in nothing but noise, else None.
+
+        It takes means (m, n), covariances (m, n, n), input and duration [s]; gives means and covariances.
+        """
+        own = (self._predict_each, self._max_substep, self.parameters)
+        densities = [self.noise]
+        for other in others:
+            if not isinstance(other, PlanarProcess):
+                return None
+            if (other._predict_each, other._max_substep, other.parameters) != own:
+                return None
+            densities.append(other.noise)
+        noise = np.array(densities)
+
+        def propagate(means: Array, covariances: Array, u: Sequence[float], dt: float) -> tuple[Array, Array]:
+            X, P, finite = self._predict_each(means, covariances, u, self._p, noise, dt, self._substeps(dt))
+            if not finite:
+                raise NotFiniteError(f"prediction over {dt:g} s from one of {means} with input {u} is not finite")
+            return X, P
+
+        return propagate
 
     def move(self, points: Array, u: Sequence[float], dt: float) -> Array:
         """States (k, n) after `dt` with the input held, each from one of `points` (k, n); angles are not wrapped."""

@@ -125,3 +125,21 @@ def test_bad_outliers_are_refused():
         Outliers(prior=1.0)
     with pytest.raises(ParameterError, match="above 0"):
         Outliers(deviations=())
+
+
+def test_several_beliefs_are_corrected_by_an_angle_as_each_is_alone():
+    """Bit for bit, over a whole turn; a covariance that is none is told of the belief that has it."""
+    rng = np.random.default_rng(5)
+    means = rng.normal(0.0, 1.0, (3, 4)) + np.array((0.0, 0.0, 3.1, 0.0))
+    roots = rng.normal(0.0, 1.0, (3, 4, 4))
+    covariances = roots @ roots.transpose(0, 2, 1)
+    H, value, R = np.array(((0.0, 0.0, 1.0, 0.5),)), np.array((-3.0,)), np.array(((0.02,),))
+    moved, less, nis, status = loops.correct_angle_each(means, covariances, H, value, R)
+    assert status == loops.OK
+    for k in range(3):
+        mean, covariance, own, _ = loops.correct_angle(means[k], covariances[k], H, value, R)
+        assert (moved[k] == mean).all()
+        assert (less[k] == covariance).all()
+        assert nis[k] == own
+    covariances[1] = -np.eye(4)
+    assert loops.correct_angle_each(means, covariances, H, value, R)[3] == loops.NOT_POSITIVE_DEFINITE

@@ -251,3 +251,20 @@ def test_wrong_fixes_that_overturn_a_filter_leave_room_for_what_it_was_sure_of(o
     # Half as much again for the spread of either hypothesis: without the other one it is above 1000.
     assert worst_nees(run, tracked, slice(overturned, next_one)) < 1.5 * worst
     assert errors[next_one:].max() < 1.5  # the next good one decides
+
+
+class OneByOne(InteractingFilter):
+    """Whose modes move on one after the other."""
+
+    def __init__(self):
+        super().__init__(PRESTERO, INTERACTING_NOISE)
+        assert self._propagate != self._propagated  # else both are the same
+        self._propagate = self._propagated
+
+
+def test_modes_that_move_on_together_are_the_same_filter():
+    run = simulate(Conditions(duration=120.0, outliers=0.1), 4)
+    together, apart = track(run, InteractingFilter(PRESTERO, INTERACTING_NOISE)), track(run, OneByOne())
+    assert np.isfinite(together.means[-1]).all()
+    assert (together.means[-1] == apart.means[-1]).all()
+    assert (together.covariances[-1] == apart.covariances[-1]).all()

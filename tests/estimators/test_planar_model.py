@@ -210,3 +210,36 @@ def test_bad_parameters_and_inputs_are_refused_by_name():
         steady_surge(PlanarParameters(m=1.0, I_z=1.0, X_prop=1.0), 0.0)
     with pytest.raises(NotFiniteError, match="not finite"):
         PlanarProcess(PRESTERO, NO_NOISE).propagate(np.full(8, math.nan), np.eye(8), INPUT, 0.5)
+
+
+def test_several_beliefs_move_on_at_once_as_each_does_alone():
+    """Bit for bit, so that a filter of several modes is the same filter."""
+    rng = np.random.default_rng(8)
+    processes = [PlanarProcess(PRESTERO, rng.uniform(0.0, 0.1, 8)) for _ in range(3)]
+    means = STATE + rng.normal(0.0, 0.1, (3, 8))
+    roots = rng.normal(0.0, 0.3, (3, 8, 8))
+    covariances = roots @ roots.transpose(0, 2, 1)
+    together = processes[0].together(processes[1:])
+    assert together is not None
+    moved, grown = together(means, covariances, INPUT, 0.7)
+    for k, process in enumerate(processes):
+        mean, covariance, _ = process.propagate(means[k], covariances[k], INPUT, 0.7)
+        assert (moved[k] == mean).all()
+        assert (grown[k] == covariance).all()
+    means[2, 4] = np.nan
+    with pytest.raises(NotFiniteError):
+        together(means, covariances, INPUT, 0.7)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        PlanarProcess(replace(PRESTERO, m=31.0), NO_NOISE),
+        PlanarProcess(PRESTERO, NO_NOISE, max_substep=0.1),
+        PlanarProcess(PRESTERO, NO_NOISE, integrator="euler"),
+        PlanarProcess(PRESTERO, np.zeros(9), biases=("surge",)),
+        object(),
+    ],
+)
+def test_processes_that_differ_in_more_than_noise_do_not_move_at_once(other):
+    assert PlanarProcess(PRESTERO, NO_NOISE).together([PlanarProcess(PRESTERO, np.ones(8)), other]) is None
