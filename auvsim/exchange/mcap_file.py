@@ -9,7 +9,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.files import whole
 from auvsim.data.log import Log
 from auvsim.exchange import layout, messages
-from auvsim.exchange.messages import Stream
+from auvsim.exchange.ros_messages import Stream
 from auvsim.ros import types
 from auvsim.simulation import scenario
 from auvsim.vehicles import library

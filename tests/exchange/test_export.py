@@ -15,7 +15,8 @@ from auvsim.base.frames import rotation
 from auvsim.cli import main
 from auvsim.data import log as logs
 from auvsim.data.log import Log
-from auvsim.exchange.messages import UNKNOWN, covariances
+from auvsim.exchange.motion_messages import covariances
+from auvsim.exchange.ros_messages import UNKNOWN
 from auvsim.identification import log_records, table_records
 
 TO_ENU, TO_FLU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]), np.diag([1.0, -1.0, -1.0])
