@@ -40,9 +40,14 @@ def sensor(
     elif kind == "dvl":
         for mode, track in ((1, "bottom"), (2, "water")):
             yield Stream(f"{topic}/{track}", types.DVL, _dvl(ros, log, name, sheet, mode))
-    elif kind == "fix":
+    elif kind in ("fix", "gps"):
         message = "geometry_msgs/msg/PoseWithCovarianceStamped" if datum is None else "sensor_msgs/msg/NavSatFix"
-        yield Stream(topic, message, _fixes(ros, log, name, frame, sheet, datum))
+        slow = sheet.bias if kind == "fix" else sheet.wander
+        yield Stream(topic, message, _fixes(ros, log, name, frame, sheet.noise**2 + slow**2, datum))
+    elif kind == "imu":
+        yield Stream(topic, "sensor_msgs/msg/Imu", _imu(ros, log, name, frame, sheet))
+    elif kind == "altimeter":
+        yield Stream(topic, "sensor_msgs/msg/Range", _altitudes(ros, log, name, sheet))
     elif kind == "range":
         yield Stream(topic, "sensor_msgs/msg/Range", _ranges(ros, log, name, frame, sheet))
     elif kind == "feedback":
@@ -92,6 +97,18 @@ def _gyro(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any) -> Rows:
         yield t, received, ros.inertial(t, frame, angular_velocity=rate, angular_velocity_covariance=covariance)
 
 
+def _imu(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any) -> Rows:
+    rates = math.radians(sheet.gyro_noise_density_deg) ** 2 * sheet.rate + math.radians(sheet.gyro_bias_deg) ** 2
+    forces = sheet.noise_density**2 * sheet.rate + sheet.bias**2
+    for t, received, values in _readings(log, name):
+        yield t, received, ros.inertial(
+            t, frame,
+            angular_velocity=ros.vector(flip(values[:3])), angular_velocity_covariance=(rates * np.eye(3)).ravel(),
+            linear_acceleration=ros.vector(flip(values[3:])),
+            linear_acceleration_covariance=(forces * np.eye(3)).ravel(),
+        )  # fmt: skip
+
+
 def _pressure(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any, scale: float) -> Rows:
     variance = scale**2 * (sheet.noise**2 + sheet.bias**2)
     for t, received, (depth,) in _readings(log, name):
@@ -122,8 +139,7 @@ def _dvl(ros: Ros, log: VehicleLog, name: str, sheet: Any, mode: int) -> Rows:
         )  # fmt: skip
 
 
-def _fixes(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any, datum: Datum | None) -> Rows:
-    variance = sheet.noise**2 + sheet.bias**2
+def _fixes(ros: Ros, log: VehicleLog, name: str, frame: str, variance: float, datum: Datum | None) -> Rows:
     for t, received, (north, east) in _readings(log, name):
         place = np.array([north, east, 0.0])
         if datum is not None:
@@ -131,6 +147,16 @@ def _fixes(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any, datum: 
         else:
             message = ros.placed(t, place, variance)
         yield t, received, message
+
+
+def _altitudes(ros: Ros, log: VehicleLog, name: str, sheet: Any) -> Rows:
+    """Ranges along the x axis of a frame that looks down the hull."""
+    for t, received, (distance,) in _readings(log, name):
+        yield t, received, ros.make(
+            "sensor_msgs/msg/Range",
+            header=ros.header(t, f"{log.name}/{name}"), radiation_type=0, field_of_view=math.radians(sheet.beam_deg),
+            min_range=sheet.minimum_range, max_range=sheet.maximum_range, range=float(distance),
+        )  # fmt: skip
 
 
 def _ranges(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any) -> Rows:

@@ -11,13 +11,20 @@ from rosbags.highlevel import AnyReader
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from auvsim.base.datum import Datum
 from auvsim.base.frames import rotation
 from auvsim.cli import main
 from auvsim.data import log as logs
 from auvsim.data.log import Log
+from auvsim.exchange import sensor_messages
 from auvsim.exchange.motion_messages import covariances
-from auvsim.exchange.ros_messages import UNKNOWN
+from auvsim.exchange.ros_messages import UNKNOWN, Ros
 from auvsim.identification import log_records, table_records
+from auvsim.sensors.altimeter import AltimeterSettings
+from auvsim.sensors.gps import GpsSettings
+from auvsim.sensors.imu import ImuSettings
+from auvsim.simulation import scenario
+from auvsim.simulation.run import run
 
 TO_ENU, TO_FLU = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]]), np.diag([1.0, -1.0, -1.0])
 
@@ -188,6 +195,40 @@ def test_reads_back_to_the_same_data(folder: Path, kind: str):
         np.testing.assert_allclose(theirs.signals[name].values - turns, signal.values, rtol=0.0, atol=tolerance)
         assert abs(math.remainder(turns, 2.0 * math.pi)) < 1e-9
     assert len(ours.signals) == 10
+
+
+def test_sensors_of_a_survey():
+    """An inertial unit, an altimeter and GPS: axes, limits and variances, of which a slow error is part."""
+    kinds = {"imu": {"kind": "imu", "bias": 0.02}, "altimeter": {"kind": "altimeter", "beam_deg": 9.0}, "gps": FIX}
+    straight = {"kind": "straight", "duration": 4.0, "speed": 1.0, "approach": 1.0}
+    plan = scenario.parse({"mission": {"kind": "manoeuvre", "manoeuvre": straight}, "sensors": kinds, "duration": 4.0})
+    vehicle, ros = run(plan, seed=2).vehicle(), Ros()
+    datum = Datum(latitude=LATITUDE, longitude=LONGITUDE)
+
+    def made(name: str, kind: str, sheet) -> tuple[str, list]:
+        (stream,) = sensor_messages.sensor(ros, vehicle, name, kind, sheet, plan, datum)
+        return stream.type, [message for *_, message in stream.rows]
+
+    name, inertial = made("imu", "imu", ImuSettings(bias=0.02))
+    values = vehicle["imu"]["value"]
+    assert name == "sensor_msgs/msg/Imu"
+    np.testing.assert_array_equal([xyz(m.angular_velocity) for m in inertial], values[:, :3] @ TO_FLU)
+    np.testing.assert_array_equal([xyz(m.linear_acceleration) for m in inertial], values[:, 3:] @ TO_FLU)
+    assert np.mean([m.linear_acceleration.z for m in inertial]) == pytest.approx(9.8, abs=0.3)  # upwards at rest
+    np.testing.assert_allclose(inertial[0].linear_acceleration_covariance[4], 7e-4**2 * 10.0 + 0.02**2)
+    np.testing.assert_allclose(
+        inertial[0].angular_velocity_covariance[8], math.radians(0.005) ** 2 * 10.0 + math.radians(0.005) ** 2
+    )
+    assert inertial[0].orientation_covariance[0] == -1.0
+    name, altitudes = made("altimeter", "altimeter", AltimeterSettings(beam_deg=9.0))
+    assert name == "sensor_msgs/msg/Range"
+    np.testing.assert_array_equal([m.range for m in altitudes], vehicle["altimeter"]["value"][:, 0])
+    first = altitudes[0]
+    assert (first.min_range, first.max_range, first.header.frame_id) == (0.3, 50.0, f"{vehicle.name}/altimeter")
+    assert first.field_of_view == pytest.approx(math.radians(9.0))
+    name, fixes = made("gps", "gps", GpsSettings(noise=0.7, wander=2.0))
+    assert name == "sensor_msgs/msg/NavSatFix"
+    assert fixes[0].position_covariance[0] == pytest.approx(0.7**2 + 2.0**2)
 
 
 def test_matlab_has_all(folder: Path, log: Log):
