@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 MASS = 30.87  # of the hull [kg]
 X_G, Y_G = 0.11, -0.03  # centre of gravity of the hull, ahead and to starboard of the origin [m]
@@ -19,7 +19,7 @@ def vehicle(folder: Path, *, x_g: float = X_G, y_g: float = 0.0) -> str:
         x_g: Centre of gravity of the hull ahead of the origin [m].
         y_g: The same to starboard [m]; the planar model has no such term.
     """
-    text = (library.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
+    text = (model_files.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
     for old, new in (
         ('<inertial pos="0.004048 0 -0.020104"', f'<inertial pos="{x_g} {-y_g} -0.020104"'),  # MuJoCo's y is to port
         ("0.839 0 0 0 0 0  0 29.44 0 0 0 0 ", f"0.839 0 0 0 0 0  0 29.44 0 0 0 {-Y_RD} "),

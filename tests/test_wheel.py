@@ -56,7 +56,7 @@ def test_installed_wheel_runs_a_trial(wheel: Path, tmp_path: Path) -> None:
     run(python, "-m", "pip", "install", "--quiet", "--no-compile", wheel, folder=tmp_path)
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
-    where = "from auvsim.vehicles import library; import estimators; print(library.models_folder())"
+    where = "from auvsim.vehicles import model_files; import estimators; print(model_files.models_folder())"
     models = Path(run(python, "-c", where, folder=elsewhere).strip())
     assert models.is_relative_to(tmp_path / "fresh")
 

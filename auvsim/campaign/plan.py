@@ -18,7 +18,7 @@ from auvsim.base.settings import Settings
 from auvsim.campaign import columns, design
 from auvsim.campaign.criterion import Criterion
 from auvsim.simulation import controllers, loading, sampling, scenario, short
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 SHIPPED = Path(auvsim.__file__).parent / "plans"
 ALONE = "all"  # name of the only variant of a plan that names none
@@ -221,7 +221,7 @@ def missions(values: Mapping) -> dict[str, str]:
         }
     given = "docking" if values.get("manoeuvre") is None else "manoeuvre"
     kind = given if values.get("mission") is None else values["mission"].get("kind", "docking")
-    return {library.model_name("vehicle", values["vehicle"]["model"]): kind}
+    return {model_files.model_name("vehicle", values["vehicle"]["model"]): kind}
 
 
 def _renewed(settings: PlanSettings) -> PlanSettings:

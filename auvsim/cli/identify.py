@@ -23,7 +23,7 @@ from auvsim.identification.pipeline import STEPS, Identification, identify
 from auvsim.identification.readers import models, read, texts
 from auvsim.identification.records import Readings
 from auvsim.physics import planar_sets
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 PARAMETERS = "parameters.yaml"
 MANY = 8  # notes that are printed; the report has all
@@ -52,7 +52,7 @@ def run(
     """
     if not logs:
         raise InputError("command line: no log; give trial logs, or CSV or NetCDF files with named columns")
-    with library.given(texts([*logs, *holdout])):
+    with model_files.given(texts([*logs, *holdout])):
         return _run(logs, out, holdout, columns, vehicle, name, steps, quick, _hull(hull), motion)
 
 
@@ -159,7 +159,7 @@ def _target(name: str, vehicle: str) -> Path:
     if not re.fullmatch(r"[A-Za-z0-9][\w-]*", name) or name == planar_sets.CONDENSE:
         raise InputError(f"command line: --name '{name}': give a plain name such as 'lake', not a path or 'condense'")
     folder = planar_sets.folder(vehicle)
-    if folder.is_relative_to(library.PACKAGE):
+    if folder.is_relative_to(model_files.PACKAGE):
         raise InputError(
             f"command line: --name keeps parameters in {folder}, within the installed package, where they would go "
             "with it; leave --name out, and give --estimator.model the parameters.yaml of --out"

@@ -9,7 +9,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.files import whole
 from auvsim.cli import report
 from auvsim.cli.run import output_folder
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import Thrusters
 
 
@@ -54,7 +54,7 @@ def from_sheet(path: Path, out: Path) -> int:
     from auvsim.vehicles import sheet
 
     made = sheet.read(path)
-    if made.name in library.shipped("vehicle"):
+    if made.name in model_files.shipped("vehicle"):
         raise InputError(f"{path}: name: '{made.name}' is a vehicle that auvsim ships; give it a name of its own")
     try:
         made_of.numbers(made)

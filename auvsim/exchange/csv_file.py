@@ -15,7 +15,7 @@ from auvsim.identification import log_records
 from auvsim.identification.signals import Signal
 from auvsim.simulation import scenario
 from auvsim.simulation.scenario import VehicleSettings
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 _DVL = {"ground_surge [m/s]": 0, "ground_sway [m/s]": 1, "surge [m/s]": 3, "sway [m/s]": 4}
 
@@ -26,7 +26,7 @@ def write(log: Log, path: Path) -> list[Path]:
     Raises:
         InputError: A vehicle has no readings of its actuators.
     """
-    with library.given(log.models):
+    with model_files.given(log.models):
         plan = scenario.from_yaml(str(log.attributes["scenario"]), "scenario of the log")
         tables = {name: dict(_columns(log.vehicle(name), plan.vehicles[name])) for name in log.vehicles}
     written = []

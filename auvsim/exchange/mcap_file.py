@@ -12,7 +12,7 @@ from auvsim.exchange import layout, messages
 from auvsim.exchange.ros_messages import Stream
 from auvsim.ros import types
 from auvsim.simulation import scenario
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 
 def write(log: Log, path: Path) -> list[Path]:
@@ -59,7 +59,7 @@ def _streams(log: Log) -> list[Stream]:
     if "latitude" in attributes and "longitude" in attributes:
         datum = Datum(latitude=float(attributes["latitude"]), longitude=float(attributes["longitude"]))
     found: dict[str, Stream] = {}
-    with library.given(log.models):
+    with model_files.given(log.models):
         plan = scenario.from_yaml(str(attributes["scenario"]), "scenario of the log")
         for name in log.vehicles:
             for stream in messages.streams(log.vehicle(name), plan, datum):

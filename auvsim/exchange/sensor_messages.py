@@ -19,7 +19,7 @@ from auvsim.physics.scenes import GRAVITY
 from auvsim.ros import types
 from auvsim.ros.frames import enu_quaternion
 from auvsim.simulation.scenario import Scenario
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 ATMOSPHERE = 101325.0  # [Pa]
 _JOINTS = "sensor_msgs/msg/JointState"
@@ -170,7 +170,7 @@ def _ranges(ros: Ros, log: VehicleLog, name: str, frame: str, sheet: Any) -> Row
 
 def _actuators(ros: Ros, log: VehicleLog, name: str, plan: Scenario, what: str) -> Rows:
     """The channels as measured, or the demand that they amount to: rudder, elevator, shaft_speed or the like."""
-    with library.given(log.log.models):
+    with model_files.given(log.log.models):
         actuation = library.vehicle(plan.vehicles[log.name].model).actuation
     if what == "channels":
         names, units = [f"{log.name}/{channel}" for channel in actuation.channels], list(actuation.units)

@@ -13,7 +13,7 @@ from auvsim.missions.manoeuvres import laws as manoeuvres
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.simulation import scenario
 from auvsim.simulation.scenario import VehicleSettings
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import FinsAndShaft
 from estimators.core.types import Array
 
@@ -26,7 +26,7 @@ def signals(path: Path) -> tuple[list[Signals], list[str], str]:
     """
     log = read(path).vehicle()
     name = path.name
-    with library.given(log.log.models):
+    with model_files.given(log.log.models):
         plan = scenario.from_yaml(str(log.log.attributes["scenario"]), f"{path}: scenario").vehicles[log.name]
         vehicle = library.vehicle(plan.model)
     for group, what in (("feedback", "fins and shaft"), ("compass", "heading")):

@@ -63,7 +63,7 @@ def models(paths: Sequence[Path]) -> set[str]:
 
 
 def texts(paths: Sequence[Path]) -> dict[tuple[str, str], str]:
-    """MJCF texts that those of the files hold that are trial logs, as `library.given` takes them.
+    """MJCF texts that those of the files hold that are trial logs, as `model_files.given` takes them.
 
     Raises:
         InputError: Two logs hold different texts of one vehicle.

@@ -12,7 +12,7 @@ import numpy as np
 from auvsim.base.errors import InputError
 from auvsim.base.frames import FLIP6, Array
 from auvsim.physics import hydrodynamics
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 from estimators.planar.model import PlanarParameters
 
@@ -125,7 +125,7 @@ def fit_planar_model(vehicle: str, speed: float, density: float = hydrodynamics.
     """
     if not 0.0 < speed < 20.0:
         raise InputError(f"no planar model of '{vehicle}' at {speed:g} m/s; give a positive speed through the water")
-    return _fit_model(vehicle, *library.source("vehicle", vehicle), speed, density)
+    return _fit_model(vehicle, *model_files.source("vehicle", vehicle), speed, density)
 
 
 @lru_cache(maxsize=64)

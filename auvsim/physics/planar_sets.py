@@ -15,7 +15,7 @@ from auvsim.base.errors import InputError, unknown_name
 from auvsim.base.settings import Settings
 from auvsim.physics.hydrodynamics import SEA_WATER
 from auvsim.physics.planar_fit import fit_planar_model
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from estimators.planar.model import PARAMETER_NAMES, PlanarParameters
 
 UNNAMED = "vehicle"  # of a log alone, without a model
@@ -135,7 +135,7 @@ def read(path: Path) -> PlanarSet:
 
 def folder(vehicle: str) -> Path:
     """Where the sets of a vehicle are: `planar` beside its MJCF file."""
-    home = Path(vehicle).expanduser().parent if vehicle.endswith(".xml") else library.models_folder() / vehicle
+    home = Path(vehicle).expanduser().parent if vehicle.endswith(".xml") else model_files.models_folder() / vehicle
     return home / "planar"
 
 

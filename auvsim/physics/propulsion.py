@@ -9,7 +9,7 @@ import numpy as np
 
 from auvsim.base.frames import Array
 from auvsim.physics.planar_fit import Level, fit_planar_model
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import Thrusters, Wrench
 
 
@@ -33,7 +33,7 @@ def propulsion(model: str, speed: float, density: float) -> Propulsion:
     """
     actuation = library.actuation(model)
     if isinstance(actuation, Thrusters):
-        level = _level(model, *library.source("vehicle", model), density)
+        level = _level(model, *model_files.source("vehicle", model), density)
         return Propulsion(
             ahead=lambda wanted: Wrench(*(-drag(level, wanted)).tolist()),
             holds=lambda wanted: bool(np.all(actuation.shares(-drag(level, wanted)) <= 1.0)),

@@ -23,7 +23,7 @@ from auvsim.physics.ballast import BallastSettings, load, shift_buoyancy
 from auvsim.physics.fluid import WATER
 from auvsim.physics.forces import RECORD
 from auvsim.physics.truth import StructurePose
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.water.terrain import FlatSettings, Terrain, TerrainSettings, build_terrain
 
 Integrator = Literal["Euler", "implicit", "implicitfast", "RK4"]
@@ -92,8 +92,8 @@ def scene(
         with at_key(f"vehicles.{name}.model"):
             soundness.check(model, settings.water_density)
     composed = _composed(
-        tuple((name, model, *library.source("vehicle", model)) for name, model in fleet.items()),
-        tuple((name, model, *library.source("structure", model)) for name, (model, _) in structures.items()),
+        tuple((name, model, *model_files.source("vehicle", model)) for name, model in fleet.items()),
+        tuple((name, model, *model_files.source("structure", model)) for name, (model, _) in structures.items()),
         tuple(_has_pillar(pose, terrain) for pose in poses.values()),
         settings,  # pyright: ignore[reportArgumentType] (frozen, and so hashable)
         rate,

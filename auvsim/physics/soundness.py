@@ -13,7 +13,7 @@ import numpy as np
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.physics.planar_fit import Level
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from auvsim.vehicles.actuation import FinsAndShaft
 
 TRIM = 0.1  # largest relative difference of buoyancy and weight; vehicles are trimmed to a few per cent
@@ -33,7 +33,7 @@ def check(vehicle: str, density: float) -> None:
     Raises:
         InputError: it is not, or cannot be used at all.
     """
-    _check(vehicle, *library.source("vehicle", vehicle), density)
+    _check(vehicle, *model_files.source("vehicle", vehicle), density)
 
 
 def check_step(vehicle: str, integrator: str, rate: float, density: float) -> None:
@@ -51,7 +51,7 @@ def check_step(vehicle: str, integrator: str, rate: float, density: float) -> No
     Raises:
         InputError: it is too long; the text says which rate would do.
     """
-    level = _level(vehicle, *library.source("vehicle", vehicle), density)
+    level = _level(vehicle, *model_files.source("vehicle", vehicle), density)
     if not _too_long(level, integrator, rate):
         return
     enough = rate

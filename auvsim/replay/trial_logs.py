@@ -18,7 +18,7 @@ from auvsim.replay.recording import DELIVERED, Arrival, Recording
 from auvsim.simulation import scenario
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.setups import model_speed, navigator_setup
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 
 def recordings(path: Path) -> list[Recording]:
@@ -28,7 +28,7 @@ def recordings(path: Path) -> list[Recording]:
         InputError: It is no whole log, or no estimator ran in it.
     """
     log = read(path)
-    with library.given(log.models):
+    with model_files.given(log.models):
         plan = scenario.from_yaml(str(log.attributes["scenario"]), f"{path}: scenario")
         return [_recording(log.vehicle(name), plan, path) for name in log.vehicles]
 
@@ -63,7 +63,7 @@ def _recording(log: VehicleLog, plan: Scenario, path: Path) -> Recording:
 
 def _setup(log: VehicleLog, plan: Scenario, vehicle: library.Vehicle, settings: Any) -> NavigatorSetup:
     """What an estimator of the log's vehicle is made from, with the models that the log holds."""
-    with library.given(log.log.models):
+    with model_files.given(log.log.models):
         return navigator_setup(plan, log.name, vehicle, settings)
 
 

@@ -8,7 +8,7 @@ from auvsim.base import yaml_text
 from auvsim.base.errors import InputError
 from auvsim.control.torpedo import AutopilotSettings
 from auvsim.simulation import sampling
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 FILE = "controller.yaml"
 
@@ -24,7 +24,7 @@ def of_model(model: Any) -> dict[str, Any]:
     """
     defaults = AutopilotSettings().model_dump(mode="json")
     try:
-        path = library.find("vehicle", model).parent / FILE
+        path = model_files.find("vehicle", model).parent / FILE
         if not path.is_file():
             return defaults
     except (InputError, AttributeError, OSError):  # whoever loads the model says what is wrong with it

@@ -27,13 +27,13 @@ from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import Integrator, WorldSettings
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation.sensor_settings import SensorSettings, rated
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from auvsim.water.seabed import SeabedSettings
 from auvsim.water.settings import CurrentSettings, UniformSettings
 from auvsim.water.terrain import FlatSettings, TerrainSettings
 
 NEAREST_STATIONS = 1.0  # between two stations of a formation [m]
-Name = Annotated[str, StringConstraints(pattern=rf"^{library.INSTANCE.pattern}$")]
+Name = Annotated[str, StringConstraints(pattern=rf"^{model_files.INSTANCE.pattern}$")]
 
 
 class DatumSettings(Settings):

@@ -14,7 +14,7 @@ from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.feedback import FeedbackSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.registry import SENSORS
-from auvsim.vehicles.library import INSTANCE
+from auvsim.vehicles.model_files import INSTANCE
 
 
 class OwnSensor(OwnPart):

@@ -31,7 +31,7 @@ from auvsim.simulation.scenario import (
     validated,
 )
 from auvsim.simulation.sensor_settings import SensorSettings
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from auvsim.water.settings import CurrentSettings, UniformSettings
 
 FULL_KEYS = {  # keys of the full form as patterns, in turn, and what they are in the short one
@@ -171,7 +171,7 @@ def _full(short: ShortScenario, places: Mapping[str, str]) -> dict[str, Any]:
 def _model_name(kind: str, model: str, key: str, places: Mapping[str, str]) -> str:
     """Name of a model, with errors that say where it was given."""
     try:
-        return library.model_name(kind, model)
+        return model_files.model_name(kind, model)
     except InputError as error:
         raise InputError(": ".join(part for part in (schema.place(key, places), key, str(error)) if part)) from None
 

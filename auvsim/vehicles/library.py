@@ -1,10 +1,6 @@
-"""Finds models/ (in a checkout or in the installed package) and loads vehicles and structures as PyMJCF elements."""
+"""Loads vehicles and structures as PyMJCF elements, with what the rest of the system needs to know of them."""
 
 import math
-import re
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from contextvars import ContextVar
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -13,10 +9,9 @@ from typing import Any
 import numpy as np
 from dm_control import mjcf
 
-import auvsim
-from auvsim.base.errors import InputError, unknown_name
+from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, flip
-from auvsim.base.settings import OTHERWISE
+from auvsim.vehicles import fields, model_files
 from auvsim.vehicles.actuation import FinsAndShaft, Thrusters
 
 
@@ -56,99 +51,6 @@ class Structure:
 
 
 ALIGNED = math.radians(5.0)  # of docks that do not say within which angle a vehicle is aligned [rad]
-PACKAGE = Path(auvsim.__file__).parent
-_MODEL = re.compile(r"<mujoco\b[^>]*?\bmodel\s*=\s*[\"']([^\"']+)")
-INSTANCE = re.compile(r"[A-Za-z_][A-Za-z0-9_-]{0,63}")  # what a vehicle or structure may be called
-_GIVEN: ContextVar[Mapping[tuple[str, str], str] | None] = ContextVar("given", default=None)  # see `given`
-_MARKS = {"vehicle": '<body name="hull"', "structure": '<site name="capture"'}  # what every MJCF of a kind has
-
-
-def models_folder() -> Path:
-    """The folder of the models: inside the installed package, else beside it in a checkout."""
-    for folder in (PACKAGE / "models", PACKAGE.parent / "models"):
-        if folder.is_dir():
-            return folder
-    raise InputError(f"no models folder inside or beside {PACKAGE}; reinstall auvsim")
-
-
-def _read(path: Path) -> str:
-    """Text of a file, which is read again when it has changed."""
-    try:
-        state = path.stat()
-        return _text(path, state.st_mtime_ns, state.st_size)
-    except FileNotFoundError:
-        raise InputError(f"model {path}: there is no such file; give a shipped model's name or an MJCF file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"model {path}: it cannot be read: {reason}") from None
-
-
-@lru_cache(maxsize=64)
-def _text(path: Path, modified: int, size: int) -> str:
-    return path.read_text(encoding="utf-8")
-
-
-def find(kind: str, name: str) -> Path:
-    """The MJCF file of a shipped model by name, or the user's own by the path of its `.xml`.
-
-    Args:
-        kind: `vehicle` or `structure`.
-        name: of the model, or a path.
-
-    Raises:
-        InputError: no model has that name; the text lists those there are.
-    """
-    if name.endswith(".xml"):
-        return Path(name).expanduser()
-    folder = models_folder()
-    path = folder / name / f"{name}.xml"
-    if not INSTANCE.fullmatch(name) or not path.is_file():
-        raise unknown_name(kind, name, shipped(kind))
-    return path
-
-
-def shipped(kind: str) -> list[str]:
-    """Names of the models that auvsim ships; `kind` as of `find`."""
-    found = models_folder().glob("*/*.xml")
-    return [path.stem for path in found if path.stem == path.parent.name and _MARKS[kind] in _read(path)]
-
-
-@contextmanager
-def given(texts: Mapping[tuple[str, str], str]) -> Iterator[None]:
-    """Takes models from texts, such as a log holds, and not from their files.
-
-    Args:
-        texts: MJCF by kind (`vehicle` or `structure`) and name; other models are read from their files.
-    """
-    before = _GIVEN.set({**(_GIVEN.get() or {}), **texts})
-    try:
-        yield
-    finally:
-        _GIVEN.reset(before)
-
-
-def source(kind: str, name: str) -> tuple[Path, str]:
-    """The MJCF file of a model and its text now, or the text that is `given`; arguments and errors as of `find`."""
-    held = _GIVEN.get() or {}
-    if (kind, name) in held:
-        return Path(name), held[kind, name]
-    path = find(kind, name)
-    return path, _read(path)
-
-
-def model_name(kind: str, name: str) -> str:
-    """Name of a model as its MJCF says it, without loading it; arguments and errors as of `find`.
-
-    Raises:
-        InputError: it cannot name a vehicle or structure, too.
-    """
-    path, text = source(kind, name)
-    match = _MODEL.search(text)
-    found = match.group(1) if match else "unnamed"
-    if not INSTANCE.fullmatch(found):
-        shown = found if len(found) <= 40 else f"{found[:37]}..."
-        raise InputError(f"model {path}: model=\"{shown}\": give a name of 1 to 64 letters, digits, '_' and '-'")
-    return found
 
 
 def _parse(path: Path, text: str) -> Any:
@@ -164,97 +66,6 @@ def _parse(path: Path, text: str) -> Any:
     return root
 
 
-def _numeric(root: Any, where: str, name: str) -> Any:
-    element = root.find("numeric", name)
-    if element is None:
-        raise InputError(f"model {where} lacks the numeric '{name}'")
-    data = np.atleast_1d(np.array([] if element.data is None else element.data, dtype=float))
-    if not data.size or not np.isfinite(data).all():
-        raise InputError(f"model {where}: the numeric '{name}' is {data.tolist()}; its data must be finite numbers")
-    if np.abs(data).max() > OTHERWISE:
-        raise InputError(f"model {where}: the numeric '{name}' has {np.abs(data).max():g}, more than {OTHERWISE:g}")
-    return data
-
-
-def _allocation(root: Any, where: str, fins: tuple[str, ...]) -> Array:
-    """Fin angle per unit of rudder and of elevator (m, 2)."""
-    columns = []
-    for name in ("allocation_rudder", "allocation_elevator"):
-        column = _numeric(root, where, name)
-        if column.size != len(fins):
-            known = ", ".join(fins) or "none"
-            raise InputError(
-                f"model {where}: '{name}' has {column.size} numbers; it wants {len(fins)}, one for each fin ({known})"
-            )
-        columns.append(column)
-    return np.stack(columns, axis=-1)
-
-
-def _length(root: Any, where: str, name: str) -> float:
-    """A numeric that is a length [m]."""
-    data = _numeric(root, where, name)
-    if data.size != 1 or data[0] <= 0.0:
-        raise InputError(f"model {where}: '{name}' is {data.tolist()}; it must be one number above 0 [m]")
-    return float(data[0])
-
-
-def _panel_contact(root: Any, where: str) -> tuple[float, float] | None:
-    """Stiffness [N/m] and damping [N s/m] of a dock's panels, if it says so."""
-    if root.find("numeric", "panel_contact") is None:
-        return None
-    data = _numeric(root, where, "panel_contact")
-    if data.size != 2 or data[0] <= 0.0 or data[1] < 0.0:
-        raise InputError(
-            f"model {where}: 'panel_contact' is {data.tolist()}; it must be a stiffness above 0 [N/m] and a damping of "
-            "0 or more [N s/m]"
-        )
-    return float(data[0]), float(data[1])
-
-
-def _site(root: Any, where: str, name: str) -> Array:
-    """Place (3,) of a site in its body [m]."""
-    site = root.find("site", name)
-    if site is None:
-        raise InputError(f"model {where} lacks the site '{name}'")
-    place = np.zeros(3) if site.pos is None else np.array(site.pos, dtype=float)
-    if not np.isfinite(place).all():
-        raise InputError(f"model {where}: the site '{name}' is at {place.tolist()}; give finite numbers")
-    return place
-
-
-def _site_x(root: Any, where: str, name: str) -> float:
-    return float(_site(root, where, name)[0])
-
-
-def _attribute(element: Any, name: str) -> Any:
-    """An attribute of an MJCF element: its own, else that of its default classes from the inside out, else None."""
-    value, group = getattr(element, name), element.dclass or element.root.default
-    while value is None and group is not None and group.tag == "default":
-        value, group = getattr(getattr(group, element.tag), name, None), group.parent
-    return value
-
-
-def _limits(root: Any, where: str, name: str) -> Array:
-    """Smallest and largest command (2,) of an actuator."""
-    actuator = root.find("actuator", name)
-    if actuator is None:
-        raise InputError(f"model {where} lacks the actuator '{name}'")
-    limits = _attribute(actuator, "ctrlrange")
-    if limits is None:
-        raise InputError(f"model {where}: actuator '{name}' needs a ctrlrange")
-    return np.array(limits, dtype=float)
-
-
-def _lag(root: Any, name: str) -> float:
-    """Time constant [s] of a servo: damping / kp of a position servo, armature / kv of a velocity servo."""
-    actuator = root.find("actuator", name)
-    terms = {"position": ("damping", "kp"), "velocity": ("armature", "kv")}.get(actuator.tag)
-    if terms is None:
-        return 0.0
-    inertia, gain = _attribute(actuator.joint, terms[0]), _attribute(actuator, terms[1])
-    return float(np.atleast_1d(inertia)[0] / gain) if inertia is not None and gain else 0.0
-
-
 def _is_driven_by_thrusters(root: Any) -> bool:
     """Whether a vehicle has thrusters and no shaft."""
     return root.find("actuator", "shaft") is None and any(n.name.endswith("_thrust") for n in root.find_all("numeric"))
@@ -265,9 +76,9 @@ def _fins_and_shaft(root: Any, name: str) -> FinsAndShaft:
         known = ", ".join(str(a.name) for a in root.find_all("actuator")) or "none"
         raise InputError(f"model {name} lacks the actuator 'shaft', that of its propeller; there are {known}")
     fins = tuple(a.name for a in root.find_all("actuator") if a.name != "shaft")
-    matrix = _allocation(root, name, fins)
-    limits = np.stack([_limits(root, name, channel) for channel in (*fins, "shaft")])
-    lags = np.array([_lag(root, channel) for channel in (*fins, "shaft")])
+    matrix = fields.allocation(root, name, fins)
+    limits = np.stack([fields.limits(root, name, channel) for channel in (*fins, "shaft")])
+    lags = np.array([fields.lag(root, channel) for channel in (*fins, "shaft")])
     return FinsAndShaft(fins=fins, matrix=matrix, limits=limits, lags=lags)
 
 
@@ -288,10 +99,10 @@ def _thrusters(root: Any, name: str) -> Thrusters:
         direction = flip(_ahead(quaternion / np.linalg.norm(quaternion)))
         columns.append(np.concatenate([direction, np.cross(place, direction)]))
         common = root.find("numeric", f"{channel}_thrust") is None
-        thrust.append(_numeric(root, name, "thruster_thrust" if common else f"{channel}_thrust"))
+        thrust.append(fields.numeric(root, name, "thruster_thrust" if common else f"{channel}_thrust"))
         band = root.find("numeric", f"{channel}_dead_band") or root.find("numeric", "thruster_dead_band")
         dead.append(0.0 if band is None else float(np.ravel(band.data)[0]))
-        lag = _attribute(root.find("actuator", channel), "dynprm")
+        lag = fields.attribute(root.find("actuator", channel), "dynprm")
         lags.append(0.0 if lag is None else float(np.ravel(lag)[0]))
     return Thrusters(
         channels=channels,
@@ -314,12 +125,12 @@ def vehicle(name: str) -> Vehicle:
     Raises:
         InputError: there is no such model, or it breaks the contract; the text says where.
     """
-    path, text = source("vehicle", name)
+    path, text = model_files.source("vehicle", name)
     root = _parse(path, text)
     hull = root.find("body", "hull")
     if hull is None:
         raise InputError(f"model {name} lacks the body 'hull'")
-    nose = _site_x(root, name, "nose")
+    nose = fields.site_x(root, name, "nose")
     aftmost = min((float(body.pos[0]) for body in hull.body if body.pos is not None), default=-nose)
     try:
         actuation = _thrusters(root, name) if _is_driven_by_thrusters(root) else _fins_and_shaft(root, name)
@@ -335,7 +146,7 @@ def actuation(name: str) -> FinsAndShaft | Thrusters:
     Raises:
         InputError: likewise.
     """
-    return _actuation(name, *source("vehicle", name))
+    return _actuation(name, *model_files.source("vehicle", name))
 
 
 @lru_cache(maxsize=16)
@@ -349,14 +160,14 @@ def structure(name: str) -> Structure:
     Raises:
         InputError: there is no such model, or it breaks the contract; the text says where.
     """
-    path, text = source("structure", name)
+    path, text = model_files.source("structure", name)
     root = _parse(path, text)
-    _site(root, name, "capture")
-    if np.abs(_site(root, name, "mouth")).max() > 1e-6:
+    fields.site(root, name, "capture")
+    if np.abs(fields.site(root, name, "mouth")).max() > 1e-6:
         raise InputError(f"model {name}: the site 'mouth' must be the origin, for a dock's place is that of its mouth")
     dimensions = ("mouth_radius", "throat_radius", "cone_length", "throat_length")
-    lengths = {dimension: _length(root, name, dimension) for dimension in dimensions}
-    latched, (mouth, throat, cone, rest) = _site_x(root, name, "latched"), lengths.values()
+    lengths = {dimension: fields.length(root, name, dimension) for dimension in dimensions}
+    latched, (mouth, throat, cone, rest) = fields.site_x(root, name, "latched"), lengths.values()
     if throat > mouth:
         raise InputError(f"model {name}: throat_radius {throat:g} m is more than mouth_radius {mouth:g} m")
     if not 0.0 < latched < cone + rest:
@@ -370,7 +181,7 @@ def structure(name: str) -> Structure:
         root=root,
         source=text,
         latched=latched,
-        aligned_within=None if aligned is None else _length(root, name, "aligned_within"),
-        panel_contact=_panel_contact(root, name),
+        aligned_within=None if aligned is None else fields.length(root, name, "aligned_within"),
+        panel_contact=fields.panel_contact(root, name),
         **lengths,
     )

@@ -14,7 +14,7 @@ from auvsim.data.log import Log, StructureLog
 from auvsim.physics import scenery, scenes
 from auvsim.physics.truth import StructurePose
 from auvsim.simulation import scenario
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from auvsim.video.motion import Motion, VehicleMoment
 
 
@@ -62,7 +62,7 @@ class Playback:
         self.log = log
         self.motions = {name: Motion(log.vehicle(name)) for name in log.vehicles}
         self.docks = {name: Dock.of(log.structure(name)) for name in log.structures}
-        with library.given(log.models):
+        with model_files.given(log.models):
             plan = scenario.from_yaml(str(log.attributes["scenario"]), "scenario in the log")
             scene = scenes.scene(
                 {name: _model(name, plan.vehicles) for name in log.vehicles},

@@ -9,7 +9,7 @@ from auvsim.analysis import vehicle_page
 from auvsim.cli import main
 from auvsim.physics.planar_fit import Level
 from auvsim.simulation import hover_trials, sea_trials
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 
 @pytest.fixture(scope="module")
@@ -129,7 +129,7 @@ def test_bad_input_is_one_line(arguments, said, capsys):
     ],
 )
 def test_a_vehicle_that_cannot_be_is_one_line(tmp_path, capsys, what, becomes, said):
-    text = library.source("vehicle", "bluerov2_heavy")[1]
+    text = model_files.source("vehicle", "bluerov2_heavy")[1]
     assert what in text
     path = tmp_path / "mine.xml"
     path.write_text(text.replace(what, becomes, 1))

@@ -13,7 +13,7 @@ from auvsim.data import log as logs
 from auvsim.simulation import scenario
 from auvsim.simulation.run import run
 from auvsim.simulation.sea_trials import PERIOD
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 
 def sailed(path: Path, model: str, seed: int) -> None:
@@ -34,7 +34,7 @@ def sailed(path: Path, model: str, seed: int) -> None:
 def test_changed_drag_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: float, grade: str):
     """Half as much again of the hull's axial drag names X_uu; the same vehicle has the best grade and no name."""
     folder = tmp_path / "own"
-    shutil.copytree(library.models_folder() / "remus100", folder)
+    shutil.copytree(model_files.models_folder() / "remus100", folder)
     model = folder / "remus100.xml"
     text, drag = model.read_text(), 'hull_quadratic_damping" data="5.84 '
     assert drag in text

@@ -7,7 +7,7 @@ import pytest
 from auvsim.base.errors import InputError
 from auvsim.physics import hydrodynamics, planar_fit
 from auvsim.physics.planar_fit import fit_planar_model
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from estimators.planar.model import step_function
 
 SPEEDS = (1.0, 1.5, 2.0)
@@ -130,7 +130,7 @@ def test_a_speed_that_is_none_is_refused(speed):
 
 
 def test_a_vehicle_without_thrust_is_refused(tmp_path):
-    text = (library.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
+    text = (model_files.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
     path = tmp_path / "drifter.xml"
     path.write_text(text.replace('thrust_coefficients" data="0.4566 -0.4174"', 'thrust_coefficients" data="0 0"'))
     with pytest.raises(InputError, match=r"drifter\.xml' cannot hold 1\.5 m/s with its propeller"):

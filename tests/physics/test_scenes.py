@@ -8,7 +8,7 @@ from auvsim.base.errors import InputError
 from auvsim.physics import scenes
 from auvsim.physics.scenes import WorldSettings, compile_scene, compose
 from auvsim.physics.truth import StructurePose as Pose
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 
 def content(model: mujoco.MjModel) -> bytes:
@@ -71,7 +71,7 @@ def test_a_pillar_stands_on_the_floor_below_its_own_structure() -> None:
 
 def test_a_model_file_that_changes_makes_another_scene(tmp_path) -> None:
     path = tmp_path / "mine.xml"
-    text = (library.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
+    text = (model_files.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
     masses = []
     for mass in ("30.87", "31.5"):
         path.write_text(text.replace('mass="30.87"', f'mass="{mass}"'), encoding="utf-8")

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 
 def text(kind: str) -> str:
     """MJCF of the shipped vehicle or structure."""
-    return library.source(kind, {"vehicle": "remus100", "structure": "dock"}[kind])[1]
+    return model_files.source(kind, {"vehicle": "remus100", "structure": "dock"}[kind])[1]
 
 
 def spoiled(folder: Path, kind: str, *changes: tuple[str, str], name: str = "mine") -> str:

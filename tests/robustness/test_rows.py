@@ -345,10 +345,10 @@ def test_what_help_and_scenario_say(capsys, arguments: list[str], says: str) -> 
 def test_identify_leaves_an_installed_package_alone(monkeypatch) -> None:
     """Names are kept in a checkout's models, or beside a vehicle of the user's own."""
     from auvsim.cli import identify
-    from auvsim.vehicles import library
+    from auvsim.vehicles import model_files
 
     assert identify._target("lake", "remus100").name == "lake.yaml"
-    monkeypatch.setattr(library, "PACKAGE", library.models_folder().parent)
+    monkeypatch.setattr(model_files, "PACKAGE", model_files.models_folder().parent)
     with pytest.raises(InputError, match="within the installed package"):
         identify._target("lake", "remus100")
     own = spoiled(Path(), "vehicle")

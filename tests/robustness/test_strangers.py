@@ -16,7 +16,7 @@ from auvsim.cli import main
 from auvsim.data import log
 from auvsim.simulation import scenario
 from auvsim.simulation.run import run
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from robustness import strangers
 from robustness.models import spoiled
 
@@ -150,6 +150,6 @@ def test_the_log_holds_the_text_of_its_models(tmp_path) -> None:
     models = log.read(tmp_path / "trial.nc").groups["models"]
     assert models["kind"].tolist() == ["vehicle", "structure"]
     assert models["model"].tolist() == [path, "dock"]
-    assert models["text"].tolist() == [text, library.source("structure", "dock")[1]]
+    assert models["text"].tolist() == [text, model_files.source("structure", "dock")[1]]
     assert models["sha256"].tolist() == [hashlib.sha256(t.encode()).hexdigest() for t in models["text"]]
     assert found.vehicles == ("mine",)

@@ -6,7 +6,7 @@ from auvsim.base.errors import InputError
 from auvsim.campaign import plan
 from auvsim.control.torpedo import AutopilotSettings
 from auvsim.simulation import controllers, loading
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 
 LAUV = {"vehicle": {"model": "lauv"}}
 
@@ -44,7 +44,7 @@ def test_a_variant_of_another_vehicle_has_that_vehicles():
 
 
 def test_a_users_own_file_stands_beside_the_model(tmp_path):
-    (tmp_path / "mine.xml").write_text(library.source("vehicle", "remus100")[1])
+    (tmp_path / "mine.xml").write_text(model_files.source("vehicle", "remus100")[1])
     (tmp_path / "controller.yaml").write_text("heading_gain: 3.5\n")
     mine = str(tmp_path / "mine.xml")
     assert loading.load_scenario(vehicle={"model": mine}).lone[1].control.heading_gain == 3.5

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 from auvsim.base.errors import InputError
 from auvsim.physics import hydrodynamics
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import Commands, FinsAndShaft
 
 LIMIT = 0.25
@@ -95,7 +95,7 @@ def turned_tail(angle, path):
 
     A fin whose hinge has turned by phi from the upright has the share cos(phi) of a rudder and sin(phi) of a plane.
     """
-    root = ElementTree.parse(library.models_folder() / "remus100" / "remus100.xml").getroot()
+    root = ElementTree.parse(model_files.models_folder() / "remus100" / "remus100.xml").getroot()
     turn = Rotation.from_euler("x", angle)
     hinges = {}
     for body in root.iter("body"):

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 
 from auvsim.base.errors import InputError
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 
 def test_every_shipped_model_is_found_and_compiles():
-    folder = library.models_folder()
+    folder = model_files.models_folder()
     names = sorted(path.stem for path in folder.glob("*/*.xml") if path.stem == path.parent.name)
     assert {"remus100", "dock"} <= set(names)
     for name in names:
@@ -60,7 +60,7 @@ def test_an_unknown_name_lists_what_there_is():
 
 
 def source():
-    return (library.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
+    return (model_files.models_folder() / "remus100" / "remus100.xml").read_text(encoding="utf-8")
 
 
 def test_a_users_own_file_is_loaded_by_its_path(tmp_path):

@@ -9,7 +9,7 @@ import pytest
 from auvsim.physics import soundness
 from auvsim.physics.hydrodynamics import bodies
 from auvsim.physics.planar_fit import Level, fit_planar_model
-from auvsim.vehicles import library
+from auvsim.vehicles import library, model_files
 
 SPEED, DENSITY = 1.3, 1026.0
 
@@ -17,7 +17,7 @@ SPEED, DENSITY = 1.3, 1026.0
 @pytest.fixture(scope="module")
 def alike(tmp_path_factory) -> str:
     """The REMUS-100 with a lift slope of 0.6 of all its movable fins."""
-    text = library.source("vehicle", "remus100")[1]
+    text = model_files.source("vehicle", "remus100")[1]
     for fin, slope in (("rudder", "0.5"), ("plane", "0.7")):
         assert f"{fin}_" in text
         for side in ("upper", "lower", "port", "starboard"):
@@ -75,12 +75,12 @@ def test_numbers_of_all_fins_stand_once_and_a_fin_may_differ():
     assert len(fins) == 8
     assert {body.fields["area"].item() for body in fins} == {0.00665}
     assert {body.fields["lift_slope"].item() for body in fins} == {3.12, 0.5, 0.7}
-    text = library.source("vehicle", "remus100")[1]
+    text = model_files.source("vehicle", "remus100")[1]
     assert text.count("_stall_angle") == 1
 
 
 def test_a_fin_of_its_own_number(tmp_path):
-    text = library.source("vehicle", "remus100")[1]
+    text = model_files.source("vehicle", "remus100")[1]
     own = text.replace(
         '<numeric name="propeller_diameter"',
         '<numeric name="plane_port_area" data="0.009"/><numeric name="propeller_diameter"',
