@@ -6,10 +6,13 @@ from typing import Any
 
 import numpy as np
 import pytest
+from dockings import DOCK_DEPTH, NOSE, new, update
 
 from auvsim.base.reading import Reading
+from auvsim.missions.docking.guidance import DockingSettings, Phase
 from auvsim.missions.docking.jam import DockShape, JamWatch, jam_watch
 from auvsim.missions.fixes import FixSource
+from auvsim.navigation.estimate import Estimate
 
 MOUNT = (0.2, -0.3, -1.0)  # of the transceiver from the mouth [m]
 AHEAD = 0.8  # of the nose from the transponder [m]
@@ -79,3 +82,35 @@ def test_the_watch_needs_a_usbl_and_takes_the_docks_shape():
     watch = jam_watch(dock, AHEAD, [ranged, ranged._replace(bearing=True, mount=MOUNT)])
     assert watch is not None
     assert (watch._dock, watch._ahead) == (SHAPE, AHEAD)
+
+
+def test_guidance_backs_out_and_ahead_again_where_astern_it_is_held_too():
+    guidance = new(DockingSettings(), sources=[FixSource((0.0, 0.0, DOCK_DEPTH), 5.0, lambda d: 0.1, True)])
+    speeds, time = {}, 0.0
+
+    def tick(along: float, fixed: float | None = None) -> None:
+        nonlocal time
+        time = round(time + 0.5, 1)
+        here = Estimate(
+            time=time, position=np.array([along - NOSE, 0.0, DOCK_DEPTH]), heading=0.0, velocity=np.zeros(3),
+            current=np.zeros(2), covariance=np.diag([1e-2] * 2 + [0.0] * 6), initialised=True,
+        )  # fmt: skip
+        fixes = [] if fixed is None else [Reading("usbl", time, time, np.array([fixed, 0, 0, 0, 0, 0, DOCK_DEPTH]))]
+        speeds[time] = update(guidance, time, here, 0.0, DOCK_DEPTH, fixes=fixes).speed
+
+    for along in (-250.0, -195.0, -100.0, -15.0, -2.0):
+        tick(along, along - NOSE)
+    assert guidance.phase == Phase.FINAL
+    held = None
+    while time < 90.0:  # the nose stays 0.4 m behind the mouth, whatever the estimate says
+        tick(0.4, -0.4 if time % 5.0 == 4.5 else None)
+        if held is None and guidance.phase == Phase.GO_AROUND:
+            held = time
+    kinds = [(event.kind, event.text) for event in guidance.events][3:]
+    assert held == 20.0  # fixes count from 10 s on: 5 s of steady thrust, and two that are 8 s apart or more
+    assert kinds[0] == ("go_around", "jammed in the funnel: the nose at +0.4 m, 0.0 m off the axis; attempt 2 follows")
+    assert kinds[1] == ("jammed", "in the funnel: the nose at +0.4 m, 0.0 m off the axis")
+    assert all(speeds[held + k] < 0.0 for k in range(1, 15))  # astern
+    freed = next(event.time for event in guidance.events if event.kind == "jammed")
+    assert 35.0 <= freed <= 40.0  # held astern too: fixes from 25.5 s on
+    assert speeds[freed + 2.0] > 0.0
