@@ -19,6 +19,7 @@ class FixSource(NamedTuple):
     deviation: Callable[[float], float]  # of a range [m] at a distance [m]
     bearing: bool = False  # whether it tells the direction too, as well across as along
     maximum: float = math.inf  # distance beyond which nothing is heard [m]
+    mount: Place = (0.0, 0.0, 0.0)  # of a USBL's transceiver in the dock's axes, from its mouth [m]
 
 
 def fix_sources(
@@ -39,7 +40,8 @@ def fix_sources(
     if usbl is not None:
         s, dock = usbl
         interval = _interval(s.interval, link.dropout_probability)
-        found.append(FixSource(dock, interval, s.sigma, bearing=True, maximum=s.maximum_range or math.inf))
+        reach = s.maximum_range or math.inf
+        found.append(FixSource(dock, interval, s.sigma, bearing=True, maximum=reach, mount=s.transceiver))
     return tuple(found)
 
 

@@ -8,6 +8,7 @@ attached.
 """
 
 import re
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import mujoco
@@ -158,6 +159,21 @@ def _record(body: Body, slot: int, density: float) -> Array:
             at = (HULL | DERIVED)[field][0]
             record[at : at + value.size] = value
     return record
+
+
+@lru_cache(maxsize=16)
+def propeller_of(text: str, density: float) -> Array | None:
+    """The numbers of the propeller of a vehicle alone, as `forces.propeller_force` reads them; None if it has none.
+
+    Args:
+        text: Its MJCF.
+        density: Of the water [kg/m3].
+
+    Raises:
+        InputError: As `bodies`.
+    """
+    found = bodies(mujoco.MjModel.from_xml_string(text))
+    return next((_record(body, 0, density) for body in found if body.kind == "propeller"), None)
 
 
 def equip(model: mujoco.MjModel, density: float = SEA_WATER) -> dict[str, int]:

@@ -17,7 +17,7 @@ PERIOD = 0.1  # of control [s]
 
 def new(settings: DockingSettings = SETTINGS, north: float = 0.0, east: float = 0.0, sources=()) -> Docking:
     """A docking at its beginning; only what guidance knows of vehicle and dock is there."""
-    structure: Any = SimpleNamespace(mouth_radius=MOUTH, latched=LATCHED)
+    structure: Any = SimpleNamespace(mouth_radius=MOUTH, latched=LATCHED, throat_radius=0.15, cone_length=1.04)
     vehicle: Any = SimpleNamespace(nose=NOSE)
     pose = StructurePose(north=north, east=east, depth=DOCK_DEPTH, heading=0.0)
     setup = MissionSetup(

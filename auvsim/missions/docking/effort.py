@@ -1,7 +1,6 @@
 """What a docking costs: energy of the shaft, way through the water, contacts; from a vehicle's log."""
 
 import math
-import xml.etree.ElementTree as ElementTree
 
 import numpy as np
 
@@ -9,8 +8,8 @@ from auvsim.base import yaml_text
 from auvsim.base.frames import Array
 from auvsim.data.log import VehicleLog
 from auvsim.missions.docking.dock_frame import to_body
-from auvsim.physics.forces import DENSITY, PROPELLER, RECORD, propeller_force
-from auvsim.physics.hydrodynamics import SEA_WATER
+from auvsim.physics.forces import propeller_force
+from auvsim.physics.hydrodynamics import SEA_WATER, propeller_of
 
 APART = 0.2  # time without force after which a contact is another one [s]
 
@@ -43,27 +42,12 @@ def _shaft_power(log: VehicleLog, ahead: Array, actuators: Array) -> Array | Non
     """
     text = log.log.models.get(("vehicle", str(log.attributes.get("model"))))
     channels = log.table("truth")["actuators"].labels
-    fields = _propeller(text) if text else {}
-    if "torque_coefficients" not in fields or "shaft" not in channels:
+    if not text or "shaft" not in channels:
         return None
-    record = np.zeros(RECORD)
-    for name, values in fields.items():
-        if name in PROPELLER:
-            start, count = PROPELLER[name]
-            record[start : start + count] = values
     scenario = yaml_text.read(str(log.log.attributes["scenario"]), "scenario of the log").value or {}
-    record[DENSITY] = scenario.get("water", {}).get("density", SEA_WATER)
+    record = propeller_of(text, scenario.get("water", {}).get("density", SEA_WATER))
+    if record is None:
+        return None
     shaft = actuators[:, channels.index("shaft")].tolist()
     torques = [propeller_force(record, 0, u, n / math.tau)[1] for u, n in zip(ahead.tolist(), shaft, strict=True)]
     return np.abs(np.array(torques) * shaft)
-
-
-def _propeller(text: str) -> dict[str, list[float]]:
-    """Fields of the body `propeller` of an MJCF text."""
-    found = ElementTree.fromstring(text).iterfind("custom/numeric")
-    named = {str(n.get("name")): n.get("data", "") for n in found}
-    return {
-        name.removeprefix("propeller_"): [float(part) for part in data.split()]
-        for name, data in named.items()
-        if name.startswith("propeller_")
-    }

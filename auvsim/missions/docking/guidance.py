@@ -19,6 +19,7 @@ from auvsim.missions.docking import path, speeds
 from auvsim.missions.docking.columns import COLUMNS, VARIABLES
 from auvsim.missions.docking.decisions import SoFar, above_or_below, not_ready, reason_to_break_off
 from auvsim.missions.docking.heard import Heard
+from auvsim.missions.docking.jam import jam_watch
 from auvsim.missions.docking.metrics import docking_metrics
 from auvsim.missions.docking.path import CLEAR
 from auvsim.missions.docking.relative import Locator, Relative
@@ -33,6 +34,7 @@ from auvsim.navigation.estimate import Estimate
 __all__ = ["CLEAR", "Docking", "DockingSettings", "Phase", "approach_course", "find_dock"]
 
 BACKING = 60.0  # longest time of backing out [s]
+FREEING = 20.0  # time of backing away from what holds the vehicle [s]
 RETURNS = 2  # times that the vehicle goes back to a gate without an attempt being counted
 FASTER = 0.3  # by how much homing is faster than an approach in a strong current [m/s]
 UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
@@ -65,6 +67,8 @@ class Docking(Mission):
         pose = self.dock.pose
         self._locator = Locator((pose.north, pose.east), setup.vehicle.nose, setup.period)
         self._fixes, self._weave = setup.fixes, STRAIGHT  # what tells where it is; the weave that is flown
+        self._jam = jam_watch(self.dock.structure, setup.vehicle.nose, setup.fixes)
+        self._backs_until = -math.inf  # time until which it backs away from what holds it [s]
         self._limit = math.radians(settings.heading_limit_deg)
         self._fastest = speeds.fastest(setup.holds)
         self.phase = Phase.SEARCH
@@ -143,6 +147,8 @@ class Docking(Mission):
                 self._occupant = delivery.message.payload.occupant
         setpoints = self._decide(now)
         self._locator.commanded(setpoints.speed)
+        if self._jam:
+            self._jam.driven(now.time, setpoints.speed)
         self.finished = self.phase in (Phase.DOCKED, Phase.ABORTED)
         return setpoints
 
@@ -165,7 +171,10 @@ class Docking(Mission):
         if self.phase == Phase.SEARCH:
             self._enter(Phase.HOMING, time, "first fix")
             self._side = math.copysign(1.0, here.cross)
+        held = self._jam.observe(now.readings, here.off) if self._jam else None
         if self.phase in (Phase.HOMING, Phase.GO_AROUND):
+            if held:
+                self._free(time, held)
             heading, depth, speed, rudder = self._homing(time, here)
             if self._s.weave and self.phase == Phase.APPROACH:
                 self._weave = self._planned_weave(estimate, here)
@@ -173,8 +182,14 @@ class Docking(Mission):
                     text = f"{self._weave.amplitude:.1f} m to both sides of the line"
                     self.events.append(Event(time, "weave", text))
         else:
-            reason = self._reason_to_break_off(time, here)
+            reason = held or self._reason_to_break_off(time, here)
+            if held:
+                self._backs_until = time + FREEING
             heading, depth, speed, rudder = self._break_off(time, here, reason) if reason else self._follow_line(here)
+            stands = self.phase == Phase.APPROACH and not self._comes_nearer(time, -here.along)
+            if stands:
+                reason = self._too_strong(here, True) or f"no progress, {-here.along:.0f} m before the entrance"
+                return self._abort(now, reason)
         # What compass and gauge will show when it is so.
         return Setpoints(wrap(heading + here.compass_bias), depth + here.depth_bias, speed, rudder)
 
@@ -216,6 +231,8 @@ class Docking(Mission):
     def _homing(self, time: float, here: Relative) -> Setpoints:
         """To the gate; on a go-around first back out of the funnel, then to a gate beside the line."""
         s, retry = self._s, self.phase == Phase.GO_AROUND
+        if time < self._backs_until:
+            return Setpoints(here.axis, self.dock_depth, -0.8 * s.approach_speed)
         if retry and self._leg == 0:
             if time - self._phase_start < BACKING and not self._has_room(here):
                 return Setpoints(here.axis, self.dock_depth, -0.8 * s.approach_speed)
@@ -247,7 +264,8 @@ class Docking(Mission):
             elif self._waits_for:
                 return self._on_course(here, path.orbit(here, gate, self._side), speed)
         elif not self._comes_nearer(time, away):
-            self._enter(Phase.ABORTED, time, self._too_strong(here) or f"no progress, {away:.0f} m from the gate")
+            reason = self._too_strong(here, True) or f"no progress, {away:.0f} m from the gate"
+            self._enter(Phase.ABORTED, time, reason)
             return Setpoints(here.heading, self.dock_depth, 0.0)
         return self._on_course(here, path.course_to(here, gate), speed)
 
@@ -265,12 +283,12 @@ class Docking(Mission):
             self._nearest = (away, time)
         return time - self._nearest[1] <= self._s.progress_timeout
 
-    def _too_strong(self, here: Relative) -> str | None:
-        """That the vehicle is too slow for the current on the approach line; None if it is not."""
+    def _too_strong(self, here: Relative, drifting: bool = False) -> str | None:
+        """That the vehicle is too slow for the current on the approach line, or anywhere where it drifts; else None."""
         along = speeds.ground_speed_along(self._line(here), self._fastest, here.current)
-        if along > HOPELESS:
-            return None
         current = math.hypot(*here.current)
+        if along > HOPELESS and (current < self._fastest or not drifting):
+            return None
         return f"current too strong for this vehicle: {current:.2f} m/s, it makes {self._fastest:.2f} m/s"
 
     def _follow_line(self, here: Relative) -> Setpoints:
@@ -330,6 +348,13 @@ class Docking(Mission):
         in_the_way = room < here.along < self._latched + 0.5 and abs(here.cross) < path.BESIDE
         self._leg = 0 if in_the_way else 1
         return self._homing(time, here)
+
+    def _free(self, time: float, held: str) -> None:
+        """Drives off what holds the vehicle on the way to a gate: astern, or ahead if it was backing."""
+        backing = time < self._backs_until or (self.phase == Phase.GO_AROUND and self._leg == 0)
+        self._backs_until = -math.inf if backing else time + FREEING
+        self._leg = max(self._leg, 1)
+        self.events.append(Event(time, "jammed", held.removeprefix("jammed ")))
 
     def _has_room(self, here: Relative) -> bool:
         """Whether the vehicle can turn before the dock; sets to which side."""
