@@ -113,16 +113,15 @@ def test_followers_that_all_tell_do_not_talk_each_other_into_a_wrong_place(kind)
     loud, quiet = ([run(told_by_all(kind, tells), seed=s) for s in range(6)] for tells in (True, False))
     squares = []
     for name in ("follower", "f1", "f2"):
-        (rms, nees), (alone, _) = judged(loud, name), judged(quiet, name)
-        assert 0.4 < nees < 2.0  # six runs, in each of which errors last
-        assert rms < max(1.25 * alone, 4.0)
-        squares.append(((rms / alone) ** 2, nees))
-    assert 0.7 < np.mean([nees for _, nees in squares]) < 1.5
-    assert np.mean([ratio for ratio, _ in squares]) < 1.0
+        (rms, nees), (alone, own) = judged(loud, name), judged(quiet, name)
+        assert 0.5 < nees < max(1.5, 1.05 * own)  # NEES of six runs, in each of which errors last, varies by itself
+        assert rms < 1.05 * alone
+        squares.append((rms / alone) ** 2)
+    assert np.mean(squares) < 0.7
 
 
 def test_a_follower_refuses_ranges_to_one_that_knows_no_better():
-    """Short form: two followers at the same distance of their leader have nothing to tell each other."""
+    """Short form: two followers that know their places alike have nothing to tell each other."""
     log = run(told_by_all("range_ekf", True, duration=120.0), seed=1)
     for name in ("follower", "f1", "f2"):
         fates = log.vehicle(name)["measurements"]
