@@ -45,6 +45,7 @@ class Estimate:
     refused: int = 0  # measurements refused so far
     reasons: Mapping[str, int] = field(default_factory=dict)  # the same by reason
     reinitialised: int = 0  # number of restarts after its numbers were no longer finite
+    warnings: tuple[str, ...] = ()  # why it may be more wrong than its covariance says, each "what: why"
     outcomes: tuple[Outcome, ...] = ()  # of the measurements accepted or refused since the last estimate
 
     @classmethod
@@ -96,11 +97,15 @@ def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, 
 
 
 def estimator_events(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:
-    """Kinds and texts of the events between two estimates: measurements refused, by reason, and starts anew."""
+    """Kinds and texts of the events between two estimates: measurements refused, by reason, and starts anew, doubts."""
     known, events = before.reasons if before else {}, []
     for reason, count in now.reasons.items():
         if (more := count - known.get(reason, 0)) > 0:
             events.append(("refused", f"{more} measurement{'s' * (more > 1)}: {reason.replace('_', ' ')}"))
     if now.reinitialised > (before.reinitialised if before else 0):
         events.append(("reinitialised", "the estimator started anew: its numbers were no longer finite"))
+    doubts = {warning.partition(":")[0] for warning in before.warnings} if before else set()
+    events += [("doubtful", warning) for warning in now.warnings if warning.partition(":")[0] not in doubts]
+    if doubts and not now.warnings:
+        events.append(("told", "the geometry of ranges tells position and current again"))
     return events

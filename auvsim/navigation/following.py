@@ -12,7 +12,7 @@ from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.reading import Reading
 from auvsim.navigation.docking import DEPTH_GAINS
 from auvsim.navigation.estimate import Estimate
-from auvsim.navigation.heard import Listener, Sight
+from auvsim.navigation.heard import LESS_CERTAIN, Listener, Sight, along, bend, flat_share
 from auvsim.navigation.measurements import averaged, measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.navigation.odometry import planned_start, required
@@ -21,13 +21,16 @@ from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
 from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter
+from estimators.core.fusion import cautious_variance
 from estimators.core.history import Node
 from estimators.core.models import sensors
 from estimators.core.models.motion import constant_velocity, with_current, with_error
+from estimators.core.models.odometry import Displacement, OdometryNoise
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
 from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
 from estimators.docking.sensors import COMPASS
+from estimators.motion_radius.geometry import Geometry
 
 SPEED, TURNING, GYRO_BIAS = 2.0, 0.1, 1e-3  # not known at first: velocities [m/s], yaw rate, bias of a gyro [rad/s]
 
@@ -37,7 +40,9 @@ class RangeNavigator(OverHistory):
 
     A range is that from where the other was when it sent to where this vehicle was when the packet arrived, and goes
     into the delay buffer with that stamp. The current is the difference between what ranges and what the DVL's water
-    track say; errors of the others' positions count as independent from packet to packet.
+    track say. Errors of another's position count as independent from packet to packet, but those of one that itself
+    ranges to others: they may be correlated with the own in any way, and count by `cautious_variance`. Where the place
+    is not known across a range, that is taken to second order.
     """
 
     def __init__(self, setup: NavigatorSetup) -> None:
@@ -45,6 +50,8 @@ class RangeNavigator(OverHistory):
         required(setup, ("a DVL (sensors.dvl.enabled: true)", bool(of_kind(setup.sensors, DvlSettings))))
         assert setup.modem is not None
         self._settings, self._modem, self._sensors = s, setup.modem, dict(setup.sensors)
+        self._ranging, self._period = setup.ranging, setup.period
+        self._odometry = OdometryNoise(position=s.position_noise)
         compass = setup.sensors.get("compass")
         self._compass_bias = math.radians(
             max(compass.heading_bias_deg, 0.01) if isinstance(compass, CompassSettings) else 1.0
@@ -78,6 +85,7 @@ class RangeNavigator(OverHistory):
         self._depth = AlphaBeta(*DEPTH_GAINS)
         self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
         self._belief: Gaussian | None = None
+        self._geometry, self._since = Geometry(), Displacement()  # of the ranges so far, and the way since the last
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now, from the readings, messages and commands since the last update."""
@@ -91,12 +99,15 @@ class RangeNavigator(OverHistory):
                 own, depth = self._sensors[reading.sensor], self._depth.value or 0.0
                 single = measurements(reading, own, depth, tilt=self._tilt)
                 found += [replace(m, covariance=m.covariance / count) for m in single] if count > 1 else single
-        found += [self._range(sight) for sight in self._listener.sights(messages) if sight.range is not None]
+        for sight in self._listener.sights(messages):
+            if sight.range is not None:
+                found += self._used(self._range(sight))
         result = self._estimator.tick(time, (), found)
         n = len(self._space)
         self._belief = result.belief
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
         mean = belief.mean
+        self._since = self._since.extended(mean[3], mean[4], mean[2], self._period, self._odometry)
         return Estimate(
             time=time,
             position=np.array((mean[0], mean[1], self._depth.at(time) or 0.0)),
@@ -110,19 +121,41 @@ class RangeNavigator(OverHistory):
             reasons=result.refused,
             reinitialised=result.reinitialised,
             outcomes=result.outcomes,
+            warnings=self._warnings(belief) if result.belief else (),
         )
+
+    def _warnings(self, belief: Gaussian) -> tuple[str, ...]:
+        """Why the geometry cannot tell; one filter knows of no second solution."""
+        return self._geometry.warnings(belief.mean[None], belief.covariance[None], np.ones(1))
+
+    def _used(self, range_: Measurement) -> list[Measurement]:
+        """A range, if it says anything; the way since the last one goes into the geometry."""
+        if not math.isfinite(variance := range_.covariance.item()):
+            self._estimator.history.refuse(LESS_CERTAIN, range_)
+            return []
+        north, east, _ = range_.parameters
+        self._geometry = self._geometry.extended(self._since, north, east, range_.value.item(), variance)
+        self._since = Displacement()
+        return [range_]
 
     def _range(self, sight: Sight) -> Measurement:
         """A range to where the other was; across depths its error of position counts less."""
         assert sight.range is not None
         s, report = self._settings, sight.report
         down = report.depth - (self._depth.value or 0.0) - self._modem.transducer[2]
-        own = self._origin if self._belief is None else self._belief.mean[:2].tolist()
-        flat = max(0.0, 1.0 - (down / max(abs(sight.range), 1e-9)) ** 2)  # share of the range that is horizontal
+        own, block = self._origin, (s.position**2, 0.0, s.position**2)
+        if (belief := self._belief) is not None:
+            own, block = belief.mean[:2].tolist(), belief.covariance[np.triu_indices(2)].tolist()
+        flat = flat_share(sight.range, down)
         timing = self._modem.sound_speed * self._modem.modem.timing_noise
         variance = s.range_noise**2 + timing**2 + flat * sight.variance_along(*own)
+        way = report.north - own[0], report.east - own[1]
+        longer, uncertain = bend(along((-way[1], way[0]), *block), math.hypot(*way))
+        variance += uncertain
+        if sight.source in self._ranging:
+            variance = cautious_variance(flat * along(way, *block), variance)
         return Measurement(
-            kind=RANGE, value=np.array((sight.range,)), covariance=np.array(((variance,),)), stamp=sight.stamp,
+            kind=RANGE, value=np.array((sight.range - longer,)), covariance=np.array(((variance,),)), stamp=sight.stamp,
             received=sight.received, sequence=sight.sequence, source=sight.source,
             parameters=(report.north, report.east, down),
         )  # fmt: skip

@@ -12,6 +12,10 @@ OFF = 1.0  # difference between own clock and time of a run above which the cloc
 REMEMBERED = 16  # pulses of a sender that wait for their packets
 
 
+CLOSEST = 1.0  # distance below which a range is not taken to bend any more [m]
+LESS_CERTAIN = "less_certain"  # why a range is refused whose sender knows its place no better than the receiver
+
+
 class Sight(NamedTuple):
     """Another vehicle as it was when it sent a pulse or packet, and where it was seen from here when that arrived."""
 
@@ -27,13 +31,36 @@ class Sight(NamedTuple):
 
     def variance_along(self, north: float, east: float) -> float:
         """Variance [m2] of the other's horizontal position along the way from a place [m] to it."""
-        to_north, to_east = self.report.north - north, self.report.east - east
-        square = to_north**2 + to_east**2
-        if square == 0.0:
-            return max(self.report.north_north, self.report.east_east)
         r = self.report
-        along = to_north**2 * r.north_north + 2.0 * to_north * to_east * r.north_east + to_east**2 * r.east_east
-        return max(0.0, along / square)
+        return along((r.north - north, r.east - east), r.north_north, r.north_east, r.east_east)
+
+
+def along(way: tuple[float, float], north_north: float, north_east: float, east_east: float) -> float:
+    """Variance [m2] of a horizontal position along a way (north, east), of any length, by its covariance."""
+    north, east = way
+    square = north**2 + east**2
+    if square == 0.0:
+        return max(north_north, east_east)
+    return max(0.0, (north**2 * north_north + 2.0 * north * east * north_east + east**2 * east_east) / square)
+
+
+def flat_share(distance: float, down: float) -> float:
+    """Share [-] of the variance along the way that a slant range shows to a place that is `down` [m] deeper."""
+    return max(0.0, 1.0 - (down / max(abs(distance), 1e-9)) ** 2)
+
+
+def bend(across: float, distance: float) -> tuple[float, float]:
+    """Mean [m] and variance [m2] of what a range is longer than to first order, for a place not known across it.
+
+    It is e^2 / (2 r) of the error e across a range r: where that counts, a filter of first order takes the circle of a
+    range for its tangent, and believes it had seen what it has not.
+
+    Args:
+        across: Variance of the place across the range [m2].
+        distance: Range in the plan view [m].
+    """
+    mean = 0.5 * across / max(distance, CLOSEST)
+    return mean, 2.0 * mean**2
 
 
 class Listener:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
@@ -11,17 +12,18 @@ from auvsim.acoustics.message import Delivery
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
-from auvsim.navigation.heard import Listener, Sight
+from auvsim.navigation.heard import LESS_CERTAIN, Listener, Sight, along, flat_share
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.navigation.odometry import UNKNOWN, Odometry, planned_start, required
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
+from estimators.core.fusion import cautious_variance
 from estimators.core.history import History
 from estimators.core.models.odometry import SPACE, OdometryNoise
 from estimators.core.types import Gaussian
 from estimators.motion_radius.bank import BankFilter
-from estimators.motion_radius.ranges import leader_range
+from estimators.motion_radius.ranges import SHARED, leader_range
 
 
 class MotionRadiusNavigator:
@@ -67,6 +69,8 @@ class MotionRadiusNavigator:
         )
         self._odometry, self._listener = Odometry(self._setup, slice(3, 6)), Listener(self._modem)
         self._place: tuple[float, float] = planned_start(self._setup)
+        position = self._setup.settings.position**2
+        self._spread = position, 0.0, position  # variances of north and of both, of east [m2]
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now, from the readings, messages and commands since the last update."""
@@ -77,13 +81,18 @@ class MotionRadiusNavigator:
             history.append(time, (odometry.forward, odometry.starboard, odometry.heading))
             for sight in self._listener.sights(messages):
                 if sight.range is not None:
-                    history.insert(self._measured(sight))
+                    measurement = self._measured(sight)
+                    if math.isfinite(measurement.covariance.item()):
+                        history.insert(measurement)
+                    else:
+                        history.refuse(LESS_CERTAIN, measurement)
             state = history.replay()
         n = len(SPACE)
         belief = state.belief if state is not None else Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
         mean = belief.mean
         if state is not None:
             self._place = float(mean[0]), float(mean[1])
+            self._spread = (*belief.covariance[np.triu_indices(2)].tolist(),)
         bias = float(mean[8])
         return Estimate(
             time=time,
@@ -97,18 +106,27 @@ class MotionRadiusNavigator:
             refused=sum(history.refused.values()),
             reasons=dict(history.refused),
             reinitialised=history.reinitialised,
+            warnings=state.warnings if state is not None else (),
             outcomes=history.outcomes,
         )
 
     def _measured(self, sight: Sight) -> Any:
         assert sight.range is not None
         report, own = sight.report, self._odometry.depth.value or 0.0
-        return leader_range(
+        found = leader_range(
             sight.range, (report.north, report.east, report.depth - self._modem.transducer[2]),
             deviation=self._range_sd, stamp=sight.stamp, received=sight.received, depth=own,
             leader_deviation=math.sqrt(sight.variance_along(*self._place)), sequence=sight.sequence,
             source=sight.source,
         )  # fmt: skip
+        if sight.source not in self._setup.ranging:
+            return found
+        way, flat = (
+            (report.north - self._place[0], report.east - self._place[1]),
+            flat_share(sight.range, report.depth - own),
+        )
+        known = cautious_variance(flat * along(way, *self._spread), found.covariance.item())
+        return replace(found, kind=SHARED, covariance=np.array([[known]]))
 
 
 def motion_radius(setup: NavigatorSetup) -> Navigator:

@@ -75,7 +75,8 @@ class NavigatorSetup:
     dock: StructurePose | None = None  # charted pose of the mission's dock
     sensors: Mapping[str, Any] = field(default_factory=dict)  # settings of those on board by name: data sheets, places
     modem: ModemSettings | None = None  # data sheet of its modem
-    others: tuple[str, ...] = ()  # names of the other vehicles that have a modem
+    others: tuple[str, ...] = ()  # names of the others that have a modem
+    ranging: tuple[str, ...] = ()  # those of them whose estimates rest on ranges to others, maybe to this vehicle
     start: tuple[float, float] = (0.0, 0.0)  # planned, north and east [m]
 
 

@@ -32,6 +32,7 @@ GENERAL: dict[str, NavigatorFactory] = {  # that need no dock
     "path_prediction": path_prediction.path_prediction,
 }
 ALL = {**ESTIMATORS, **GENERAL}
+RANGING = ("range_ekf", "motion_radius", "path_prediction")  # whose estimates rest on ranges to other vehicles
 
 
 def build(setup: NavigatorSetup) -> Navigator:

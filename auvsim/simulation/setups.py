@@ -4,6 +4,7 @@ from typing import Any
 
 from auvsim.base.errors import at_key
 from auvsim.navigation.navigator import NavigatorSetup
+from auvsim.navigation.registry import RANGING
 from auvsim.physics import planar_sets
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board, rated
@@ -39,6 +40,7 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
     if not isinstance(vehicle.actuation, Thrusters):
         with at_key(f"vehicles.{name}.estimator.model"):
             parameters = planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density)
+    others = tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name)
     return NavigatorSetup(
         vehicle=name,
         settings=assumed,
@@ -50,6 +52,7 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
         dock=plan.structures[dock].pose if dock else None,
         sensors=dict(on_board(own.sensors)),
         modem=own.modem,
-        others=tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name),
+        others=others,
+        ranging=tuple(other for other in others if plan.vehicles[other].estimator.kind in RANGING),
         start=plan.start_position(name)[:2],
     )

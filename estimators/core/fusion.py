@@ -1,5 +1,7 @@
 """Fusion of beliefs whose correlation is unknown: covariance intersection (Julier and Uhlmann 1997)."""
 
+import math
+
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -38,6 +40,24 @@ def intersect_partial(belief: Gaussian, H: Array, value: Array, covariance: Arra
     mean = belief.mean + K @ (value - H @ belief.mean)
     L = np.eye(belief.mean.size) - K @ H
     return Gaussian(mean=mean, covariance=L @ P @ L.T + K @ R @ K.T)
+
+
+def cautious_variance(own: float, told: float) -> float:
+    """The variance with which a scalar measurement is to count whose error may have any correlation with one's own.
+
+    With the usual gain K of that variance the error is at worst (1 - K) sqrt(own) + K sqrt(told), which is to be no
+    larger than the corrected variance (1 - K) own says: 1 - K = (r / (1 - r))^2 with r = sqrt(told / own). Infinite
+    from r = 1/2 on: of two errors that may be one, the mean helps no more than the better of them.
+
+    Args:
+        own: Predicted variance of what is measured.
+        told: Variance of the measurement's error.
+    """
+    if not told < 0.25 * own:
+        return math.inf
+    r = math.sqrt(told / own)
+    kept = (r / (1.0 - r)) ** 2  # 1 - K
+    return own * kept / (1.0 - kept)
 
 
 def _weighed(a: Gaussian, b: Gaussian, A: Array, B: Array, angles: tuple[int, ...]) -> Gaussian:

@@ -1,6 +1,7 @@
 """A bank of extended Kalman filters against mirror solutions: each starts from a current of its own, ranges decide.
 
-Each range is used once; its variance holds that of the leader's place. The states are those of
+Each range is used once; its variance holds that of the leader's place. One of the kind `SHARED` corrects each filter,
+but tells nothing of which of them is right. The states are those of
 `core.models.odometry`: give a deviation at the start to what is to be estimated, clock, sound speed, speed log and
 compass included; what has none is taken as right.
 """
@@ -20,7 +21,7 @@ from estimators.core.history import Input, Node
 from estimators.core.models.odometry import SPACE, Displacement, N, OdometryNoise, move, show_range, spread
 from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdicts
 from estimators.motion_radius.geometry import Geometry
-from estimators.motion_radius.ranges import KIND
+from estimators.motion_radius.ranges import KIND, SHARED
 
 SAME = 0.05  # squared normalised distance below which two filters have come to the same solution
 IMPROBABLE = 1e-6  # probability below which a filter is given up
@@ -112,7 +113,7 @@ class BankFilter:
             NotFiniteError: The correction is not finite.
         """
         for m in measurements:
-            if m.kind != KIND:
+            if m.kind not in (KIND, SHARED):
                 state = state._replace(verdicts=(*state.verdicts, (m, NO_MODEL, math.nan)))
                 continue
             state = self._ranged(state, m)
@@ -128,7 +129,9 @@ class BankFilter:
             return state._replace(verdicts=(*state.verdicts, (m, OUTLIER, best)))
         if not (np.isfinite(logs).all() and np.isfinite(means).all()):
             raise NotFiniteError(f"correction by the range {distance} m at {m.stamp} s is not finite")
-        weights, accepted = imm.update(state.weights, logs), state.accepted + 1
+        # Errors that last from packet to packet would be counted again and again as evidence for one filter.
+        weights = state.weights if m.kind == SHARED else imm.update(state.weights, logs)
+        accepted = state.accepted + 1
         verdict = (m, "", float(nis[weights.argmax()]))
         if accepted % self._pruned == 0 and len(weights) > 1:
             means, covariances, weights = pruned(means, covariances, weights)

@@ -8,6 +8,7 @@ from estimators.core.errors import ParameterError
 from estimators.core.types import Measurement
 
 KIND = "range"
+SHARED = "shared_range"  # to one whose error may be correlated with the own, its variance as of core.fusion
 
 
 def leader_range(

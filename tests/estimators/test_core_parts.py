@@ -258,3 +258,23 @@ def test_smoothing_any_filter_improves_on_it():
     smoothed = dict(estimator.smoothed())
     means = np.array([smoothed[time].mean for time in run.times.tolist()])
     assert rms(means, run.truth) < 0.8 * rms(np.array(filtered), run.truth)
+
+
+@pytest.mark.parametrize("correlation", [-1.0, -0.5, 0.0, 0.6, 1.0])
+@pytest.mark.parametrize("told", [0.01, 0.5, 2.2])
+def test_a_cautious_variance_holds_for_any_correlation(correlation, told):
+    """Closed form of the true variance after the correction; at a correlation of 1 it is what the filter says."""
+    own = 9.0
+    counted = fusion.cautious_variance(own, told)
+    gain = own / (own + counted)
+    both = correlation * math.sqrt(own * told)
+    true = (1.0 - gain) ** 2 * own + gain**2 * told + 2.0 * gain * (1.0 - gain) * both
+    assert told <= (1.0 - gain) * own < own
+    assert true <= (1.0 - gain) * own * (1.0 + 1e-12)
+    if correlation == 1.0:
+        assert true == pytest.approx((1.0 - gain) * own)
+
+
+@pytest.mark.parametrize("told", [2.25, 9.0, 100.0, math.inf, math.nan])
+def test_what_is_known_no_better_does_not_count(told):
+    assert fusion.cautious_variance(9.0, told) == math.inf

@@ -1,6 +1,7 @@
 """Filters of ranges to a leader: the paper's algebra, the bank against core's models, late packets, geometry."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from estimators.motion_radius import batch, paper
 from estimators.motion_radius.bank import BankFilter, pruned, spread_over_currents
 from estimators.motion_radius.geometry import second_solution
 from estimators.motion_radius.paper import Packet, PaperFilter
-from estimators.motion_radius.ranges import flattened, leader_range
+from estimators.motion_radius.ranges import SHARED, flattened, leader_range
 from estimators.motion_radius.reckoning import DeadReckoning
 
 X = np.array([130.0, -40.0, 0.3, -0.7])
@@ -445,3 +446,17 @@ def test_bank_is_consistent_where_a_lone_filter_gets_lost():
     assert noise.range == 3.0
     assert 0.75 * 2.8 < math.sqrt(np.mean(squares)) < 1.3 * 2.8
     assert 0.7 < np.mean(nees) < 1.4
+
+
+def test_a_range_to_one_that_may_share_its_error_decides_between_no_filters():
+    """It corrects each filter as any range does, but leaves their probabilities."""
+    start = SPACE.belief({"north": X[0], "east": X[1]}, DEVIATIONS)
+    bank = BankFilter(start, NOISE)
+    state = bank.predict(bank.start([Node(0.0, (), [], True)], 0), (2.0, 0.0, 0.3), 8.0)
+    seen = leader_range(180.0, (*LEADER, 4.0), deviation=1.0, stamp=8.0, depth=2.0)
+    plain, shared = (bank.correct(state, 8.0, [m]) for m in (seen, replace(seen, kind=SHARED)))
+    assert np.array_equal(plain.means, shared.means)
+    assert np.array_equal(plain.covariances, shared.covariances)
+    assert np.array_equal(shared.weights, state.weights)
+    assert np.abs(plain.weights - state.weights).max() > 0.01
+    assert [reason for _, reason, _ in shared.verdicts] == [""]

@@ -5,6 +5,7 @@ import pytest
 
 from auvsim import load_scenario
 from auvsim.base.errors import InputError
+from auvsim.navigation.heard import along, bend
 from auvsim.simulation.run import Simulation, run
 
 
@@ -61,3 +62,54 @@ def test_late_packets_are_used(tell):
 def test_what_is_missing_is_named(kind, sensors, text):
     with pytest.raises(InputError, match=text):
         Simulation(follower(kind, 10.0, **sensors), seed=0)
+
+
+def test_a_range_is_longer_than_its_tangent():
+    """Mean and variance over a million errors across it; the next terms of the series are (sd / range)^2 of them."""
+    distance, deviation = 200.0, 15.0
+    across = deviation * np.random.default_rng(0).standard_normal(1_000_000)
+    longer = np.hypot(distance, across) - distance
+    mean, variance = bend(deviation**2, distance)
+    assert mean == pytest.approx(longer.mean(), rel=0.02)
+    assert variance == pytest.approx(longer.var(), rel=0.05)
+
+
+def test_variance_along_a_way():
+    """Of a covariance with unlike axes: as the quadratic form has it, for a way of any length, or none."""
+    P = np.array(((4.0, -1.5), (-1.5, 9.0)))
+    block = P[0, 0], P[0, 1], P[1, 1]
+    way = np.array((3.0, -0.7))
+    assert along((3.0, -0.7), *block) == pytest.approx(way @ P @ way / (way @ way))
+    assert along((6.0, -1.4), *block) == pytest.approx(along((3.0, -0.7), *block))
+    assert along((0.0, 0.0), *block) == 9.0
+
+
+def straight(kind, duration, course_deg=8.0, follows_deg=8.0):
+    """Leader and follower hold their headings."""
+    held = [{"kind": "weave", "course_deg": course, "amplitude_deg": 0.0} for course in (course_deg, follows_deg)]
+    return load_scenario(
+        "leader_follower", duration=duration,
+        vehicles={
+            "leader": {"mission": {"pattern": held[0]}},
+            "follower": {
+                "mission": {"pattern": held[1]}, "estimator": {"kind": kind}, "start": {"heading_deg": follows_deg}
+            },
+        },
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("kind", ["range_ekf", "motion_radius"])
+def test_blind_geometry_is_told_with_its_reason(kind):
+    log = run(straight(kind, 300.0), seed=8)
+    events = log.vehicle("follower")["event"]
+    texts = events["text"][events["kind"] == "doubtful"].tolist()
+    assert any("no motion relative to the leader" in text or "a constant course" in text for text in texts)
+    assert "told" not in events["kind"].tolist()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("follows_deg", "most"), [(8.0, 8.0), (30.0, 2.0)], ids=["parallel", "oblique"])
+def test_an_extended_filter_does_not_think_that_it_sees_what_nobody_can(follows_deg, most):
+    """Six runs of 900 s; to first order alone NEES is 1400 in parallel, where rank is 2 of 4."""
+    logs = [run(straight("range_ekf", 900.0, follows_deg=follows_deg), seed=s) for s in range(6)]
+    assert np.mean([judged(log, 250.0)[1] for log in logs]) < most

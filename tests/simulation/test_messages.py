@@ -173,10 +173,12 @@ def test_a_follower_that_hears_nothing_for_an_hour():
 
 
 def _deaf(duration):
-    deaf = plan(duration, network={"dropout_probability": 1.0})
-    log = run(deaf.model_copy(update={"vehicles": dict(deaf.vehicles)}), seed=6)
+    lasts = {"mission": {"lasts": duration}}
+    deaf = plan(duration, network={"dropout_probability": 1.0}, vehicles={"leader": lasts, "follower": lasts})
+    log = run(deaf, seed=6)
     assert log.attributes["status"] == "complete"
     times, error, covariance = errors(log)
+    assert times[-1] == pytest.approx(duration, abs=1.0)
     end = times > 0.5 * duration
     normalised = [e @ np.linalg.solve(P, e) for e, P in zip(error[end], covariance[end], strict=True)]
     assert max(normalised) < 9.2  # 99 % of two degrees of freedom
