@@ -11,11 +11,12 @@ import usv
 
 from auvsim import cli
 from auvsim.base.errors import InputError
-from auvsim.identification.motion import data, files, fit
+from auvsim.identification.motion import data, fit
 from auvsim.identification.motion.choice import Folds
 from auvsim.identification.motion.identify import identify_motion
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
+from auvsim.physics import motion_models
 from estimators.planar.terms import LABELS, STRUCTURES, THRUSTER, TWIN, TermsProcess, structure
 
 SEA = tanker.Sea(disturbance=2e-3, lag=0.0, filtered=0.0)
@@ -54,7 +55,7 @@ def test_the_command_takes_two_shafts(logs: list[Path], tmp_path: Path, capsys: 
     """A model that a filter takes with all its inputs; one shaft alone is no pair, and says which is lacking."""
     out = tmp_path / "o"
     assert cli.main(["identify", str(logs[1]), "--out", str(out), "--quick"]) == 0
-    process = files.read(out / files.NAME).process()
+    process = motion_models.read(out / motion_models.NAME).process()
     x = np.array([0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.0])
     turned = [process.evaluate(x, (0.0, 80.0, 0.0, 0.0, apart, 0.0), 2.0)[5] for apart in (20.0, -20.0)]
     assert turned[0] > 0.02
