@@ -141,3 +141,16 @@ def test_a_rudder_that_stays_is_refused_unless_shafts_steer(logs: list[Path]) ->
     still = replace(record, thrusters=np.zeros_like(record.thrusters))
     with pytest.raises(InputError, match="the rudder stays"):
         identify_motion(replace(readings, records=(still,)))
+
+
+def test_few_stretches_count_by_what_they_are_worth() -> None:
+    """Whole records of two make no jackknife: then intervals are those of the squares, by what these are worth."""
+    runs = [tanker.sail(kind, 4, SEA._replace(disturbance=2e-4), 100.0, ship=mariner.ship(4)) for kind in KINDS[1:3]]
+    motions = [_motion(run) for run in runs]
+    kept = structure("few", "1 u|u| n|n|", "v ur uud", "v r uud")
+    first = fit.least_squares(motions, kept)
+    found = fit.segments(motions, [first], fit.STEPS[3])
+    assert len(found.blocks) == 2
+    assert found.worth == pytest.approx(fit.ALIKE * motions[0].duration)
+    alone = found.worth / np.diag(found.information)  # each variance if the others were known: the least that it can be
+    assert (np.diag(fit.covariance(found)) > 0.99 * alone).all()
