@@ -22,7 +22,7 @@ from auvsim.identification.motion.identify import MotionIdentification, identify
 from auvsim.identification.pipeline import STEPS, Identification, identify
 from auvsim.identification.readers import models, read, texts
 from auvsim.identification.records import Readings
-from auvsim.physics import planar_sets
+from auvsim.physics import motion_models, planar_sets
 from auvsim.vehicles import model_files
 
 PARAMETERS = "parameters.yaml"
@@ -136,10 +136,10 @@ def _vehicle(paths: Sequence[Path]) -> str | None:
 def _write_motion(found: MotionIdentification, out: Path, *, alone: bool) -> list[Path]:
     """The motion model's report and file; also the planar model nearest to it where no vehicle's own is fitted."""
     written = list(motion_page.write(found, out, "report" if alone else "motion"))
-    model, parameters = out / files.NAME, out / PARAMETERS
+    model, parameters = out / motion_models.NAME, out / PARAMETERS
     model.unlink(missing_ok=True)  # an earlier run's would not belong to this report
     if found.better:
-        files.write(files.motion_model(found), model)
+        motion_models.write(files.motion_model(found), model)
         written.insert(0, model)
     if alone:
         parameters.unlink(missing_ok=True)
@@ -226,7 +226,7 @@ def show_motion(found: MotionIdentification, planar: Identification | None = Non
         candidates.add_row(c.structure.name, c.step, *own)
     console.print(candidates)
     if not found.better:
-        console.print(f"! no {files.NAME} written: going on as it began predicts as well", soft_wrap=True)
+        console.print(f"! no {motion_models.NAME} written: going on as it began predicts as well", soft_wrap=True)
 
 
 def compared(planar: Identification, motion: MotionIdentification) -> tuple[bool, str] | None:

@@ -13,7 +13,6 @@ from auvsim.identification.records import MEASURED, Record
 from auvsim.identification.signals import Signals
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array
-from estimators.docking.models import steady_surge
 from estimators.planar.model import MAX_SUBSTEP, PlanarParameters, PlanarProcess
 
 LEAST = 20.0  # of data in all: the vehicle's surge alone takes some 10 s to settle [s]
@@ -215,7 +214,7 @@ def _headway(found: Sequence[Record], start: PlanarParameters) -> None:
         if not np.isfinite(speeds).any():
             continue
         try:
-            expected = steady_surge(start, float(np.median(np.concatenate([r.inputs[:, 1] for r in found]))))
+            expected = start.steady_surge(float(np.median(np.concatenate([r.inputs[:, 1] for r in found]))))
         except ParameterError:  # a start without drag
             return
         ratio = float(np.nanmedian(np.abs(speeds))) / max(expected, 1e-3)

@@ -20,7 +20,6 @@ from auvsim.identification.segments import SegmentOptions, fit_segments
 from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.vehicles import library
 from estimators.core.consistency import chi_square
-from estimators.docking.models import steady_surge
 from estimators.planar.model import SURGE_LIMIT, PlanarParameters
 
 STEPS = ("least squares", "segments", "prediction error")
@@ -169,7 +168,7 @@ def _speed(records: Sequence[Record], vehicle: str) -> float:
         return 1.0
     shaft = float(np.mean(np.concatenate([r.inputs[:, 1] for r in records])))
     limit = library.vehicle(vehicle).actuation.shaft_limit
-    return float(np.clip(steady_surge(fit_planar_model(vehicle, 1.0).parameters, min(shaft, limit)), 0.2, 10.0))
+    return float(np.clip(fit_planar_model(vehicle, 1.0).parameters.steady_surge(min(shaft, limit)), 0.2, 10.0))
 
 
 def _fits(

@@ -8,7 +8,6 @@ from auvsim.identification import compiled
 from auvsim.identification.records import Record
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array
-from estimators.docking.models import steady_surge
 from estimators.planar.model import MAX_SUBSTEP, PlanarParameters
 
 # A body on which nothing acts in its own axes: its velocities stay as they are.
@@ -51,7 +50,7 @@ def first_belief(record: Record, start: PlanarParameters, nuisances: Array) -> t
 
 def _guessed_surge(start: PlanarParameters, shaft_speed: float) -> float:
     try:
-        return steady_surge(start, shaft_speed)
+        return start.steady_surge(shaft_speed)
     except ParameterError:  # a start without drag
         return 1.0
 

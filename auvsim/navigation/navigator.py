@@ -14,7 +14,7 @@ from auvsim.vehicles.actuation import Actuation
 from estimators.core.estimator import StateFilter
 from estimators.core.history import Node
 from estimators.core.types import Gaussian
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import Dynamics
 
 
 class Navigator(Protocol):
@@ -67,7 +67,7 @@ class NavigatorSetup:
 
     vehicle: str  # its name
     settings: Any  # of the estimator; of a user's own, its class `Settings` or what stands under `settings`
-    parameters: PlanarParameters | None  # the planar model that it assumes; None of one that thrusters drive
+    parameters: Dynamics | None  # the model of its motion that it assumes; None of one that thrusters drive
     actuation: Actuation
     period: float  # time between two updates [s]
     rates: Mapping[str, float]  # of the sensors that the vehicle has, by name [Hz]

@@ -164,12 +164,21 @@ def load(name: str, vehicle: str) -> PlanarParameters:
     """
     path = find(name, vehicle)
     found = read(path)
-    wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
-    if found.vehicle not in (wanted, UNNAMED):
-        raise InputError(f"{path}: these are parameters of '{found.vehicle}', not of '{wanted}'")
+    same_vehicle(found.vehicle, vehicle, path)
     parameters = found.planar()
     _check(parameters, found.speed, path)
     return parameters
+
+
+def same_vehicle(named: str, vehicle: str, path: Path) -> None:
+    """Refuses what a file says of another vehicle; what was identified from a log without a vehicle goes for any.
+
+    Raises:
+        InputError: It is another vehicle's.
+    """
+    wanted = Path(vehicle).stem if vehicle.endswith(".xml") else vehicle
+    if named not in (wanted, UNNAMED):
+        raise InputError(f"{path}: these are parameters of '{named}', not of '{wanted}'")
 
 
 def dissipates(p: PlanarParameters, speed: float) -> bool:

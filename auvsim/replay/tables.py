@@ -16,7 +16,7 @@ from auvsim.identification.columns import read_map
 from auvsim.identification.signals import Signal, Signals
 from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.navigation.settings import ReckoningSettings
-from auvsim.physics import planar_sets
+from auvsim.physics import motion_models
 from auvsim.replay.recording import Arrival, Recording
 from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
@@ -62,7 +62,7 @@ def _recording(signals: Signals, vehicle: str) -> Recording:
         return NavigatorSetup(
             vehicle=signals.name,
             settings=assumed,
-            parameters=planar_sets.assumed(getattr(assumed, "model", "condense"), vehicle, model_speed(assumed)),
+            parameters=motion_models.assumed(getattr(assumed, "model", "condense"), vehicle, model_speed(assumed)),
             actuation=actuation,
             period=STEP,
             rates={name: own.rate for name, own in settings.items() if hasattr(own, "rate")},

@@ -5,7 +5,7 @@ from typing import Any
 from auvsim.base.errors import at_key
 from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.navigation.registry import RANGING
-from auvsim.physics import planar_sets
+from auvsim.physics import motion_models
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board, rated
 from auvsim.vehicles.actuation import Thrusters
@@ -39,7 +39,7 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
     parameters = None
     if not isinstance(vehicle.actuation, Thrusters):
         with at_key(f"vehicles.{name}.estimator.model"):
-            parameters = planar_sets.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density)
+            parameters = motion_models.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density)
     others = tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name)
     return NavigatorSetup(
         vehicle=name,

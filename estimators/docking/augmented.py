@@ -8,7 +8,7 @@ from estimators.docking.models import ModelOptions, PlanarModels
 from estimators.docking.noise import DockingNoise
 from estimators.docking.recovery import FixRecovery
 from estimators.docking.sensors import USBL
-from estimators.planar.model import PlanarParameters
+from estimators.planar.model import Dynamics
 
 __all__ = ["AugmentedFilter", "AugmentedState", "Transform"]
 
@@ -46,7 +46,7 @@ class AugmentedFilter(ModelFilter):
 
     def __init__(
         self,
-        parameters: PlanarParameters,
+        parameters: Dynamics,
         noise: DockingNoise | None = None,
         *,
         gate: float | None = 0.999,

@@ -9,12 +9,12 @@ import numpy as np
 from estimators.core.history import Node
 from estimators.core.interacting import InteractingModelFilter, InteractingState
 from estimators.core.outliers import Outliers
-from estimators.core.types import Array, Gaussian, Measurement
+from estimators.core.types import Array, Gaussian, Measurement, ProcessModel
 from estimators.docking.models import ModelOptions, PlanarModels
 from estimators.docking.noise import ROBUST_NOISE, DockingNoise
 from estimators.docking.recovery import FixRecovery
 from estimators.docking.sensors import USBL
-from estimators.planar.model import PlanarParameters, PlanarProcess
+from estimators.planar.model import Dynamics
 
 __all__ = ["InteractingFilter", "InteractingState"]
 
@@ -38,7 +38,7 @@ class InteractingFilter(InteractingModelFilter):
 
     def __init__(
         self,
-        parameters: PlanarParameters,
+        parameters: Dynamics,
         noise: DockingNoise = ROBUST_NOISE,
         *,
         currents: Sequence[float] = (1e-8, 0.02),
@@ -53,7 +53,7 @@ class InteractingFilter(InteractingModelFilter):
         self.models = models = PlanarModels(parameters, noise, **options)
         densities = np.array(currents, dtype=float)
 
-        def blended(weights: Array) -> PlanarProcess:
+        def blended(weights: Array) -> ProcessModel:
             return models.process_with(replace(noise, current=float(weights @ densities)))
 
         mixture = outliers or Outliers()

@@ -6,32 +6,14 @@ from typing import TypedDict
 
 import numpy as np
 
-from estimators.core.errors import ParameterError
 from estimators.core.history import Node
 from estimators.core.loops import wrap
-from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel
+from estimators.core.types import Array, Gaussian, Measurement, MeasurementModel, ProcessModel
 from estimators.docking import range_start
 from estimators.docking.aids import RANGE, Aids
 from estimators.docking.noise import DockingNoise
 from estimators.docking.sensors import COMPASS, USBL, HeadingModel, PositionModel
-from estimators.planar.model import MAX_SUBSTEP, Integrator, PlanarParameters, PlanarProcess
-
-
-def steady_surge(parameters: PlanarParameters, shaft_speed: float) -> float:
-    """Surge [m/s] at which thrust and drag balance on a straight course; 0 if the thrust is astern.
-
-    Raises:
-        ParameterError: The parameters have thrust but no drag.
-    """
-    p, n = parameters, shaft_speed
-    a, b, c = p.X_uu, p.X_u + p.X_nu * abs(n), p.X_prop + p.X_nn * n * abs(n)
-    if c <= 0.0:
-        return 0.0
-    if a < 0.0:
-        return (-b - math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
-    if a == 0.0 and b < 0.0:
-        return -c / b
-    raise ParameterError(f"thrust {c:g} N meets no drag: X_uu {p.X_uu:g} or X_u {p.X_u:g} must be below 0")
+from estimators.planar.model import MAX_SUBSTEP, Dynamics, Integrator
 
 
 class ModelOptions(TypedDict, total=False):
@@ -48,7 +30,7 @@ class PlanarModels:
     """Process and measurement models of a docking filter, made from its assumptions; and its start.
 
     Args:
-        parameters: The vehicle.
+        parameters: The vehicle: `PlanarParameters`, or `TermsMotion` of any structure.
         noise: Noise that the filter assumes, and the biases in its state.
         transponder: Place of the acoustic transponder on the hull, (x, y) forward and starboard of the origin [m].
         initial_surge: Surge at the first fix [m/s]; None: steady at the shaft speed then.
@@ -59,7 +41,7 @@ class PlanarModels:
 
     def __init__(
         self,
-        parameters: PlanarParameters,
+        parameters: Dynamics,
         noise: DockingNoise,
         *,
         transponder: tuple[float, float] = (0.0, 0.0),
@@ -80,9 +62,9 @@ class PlanarModels:
             transponder, n, dock_heading=places.get("dock_heading"), clock=places.get("clock")
         )
 
-    def process_with(self, noise: DockingNoise) -> PlanarProcess:
+    def process_with(self, noise: DockingNoise) -> ProcessModel:
         """The vehicle with other densities of the process noise."""
-        return PlanarProcess(self.parameters, noise.densities(), **self._numerics)
+        return self.parameters.process(noise.densities(), **self._numerics)
 
     @property
     def sensors(self) -> dict[str | tuple[str, str], MeasurementModel]:
@@ -145,7 +127,7 @@ class PlanarModels:
         """The state at a start with its place still open."""
         surge = self._initial_surge
         if surge is None:
-            surge = steady_surge(self.parameters, node.input[1])
+            surge = self.parameters.steady_surge(node.input[1])
         return np.array([0.0, 0.0, heading, surge, 0.0, 0.0, 0.0, 0.0, *(0.0 for _ in self.noise.bias_names)])
 
     def _belief(self, mean: Array, place: Array, onto: Array) -> Gaussian:

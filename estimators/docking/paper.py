@@ -11,11 +11,11 @@ from estimators.core import ekf
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
 from estimators.core.history import Input, Node
-from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdicts
+from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, ProcessModel, Verdicts
 from estimators.docking.models import ModelOptions, PlanarModels
 from estimators.docking.noise import PAPER_NOISE, DockingNoise
 from estimators.docking.sensors import COMPASS, USBL
-from estimators.planar.model import PlanarParameters, PlanarProcess
+from estimators.planar.model import Dynamics
 
 
 def estimate_current(
@@ -68,7 +68,7 @@ class PaperFilter:
 
     def __init__(
         self,
-        parameters: PlanarParameters,
+        parameters: Dynamics,
         noise: DockingNoise = PAPER_NOISE,
         *,
         weights: tuple[float, ...] | None = (0.3, 0.3, 0.4),
@@ -114,7 +114,7 @@ class PaperFilter:
                 state = state._replace(verdicts=(*state.verdicts, (measurement, NO_MODEL, math.nan)))
         return state
 
-    def process_after(self, state: PaperState) -> PlanarProcess:
+    def process_after(self, state: PaperState) -> ProcessModel:
         """For `smoothing`, which needs more than this filter knows.
 
         Raises:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass, fields
 from functools import lru_cache
 from types import ModuleType, SimpleNamespace
-from typing import Literal
+from typing import Literal, Protocol
 
 import casadi as ca
 import numpy as np
@@ -76,6 +76,47 @@ class PlanarParameters:
     def vector(self) -> Array:
         """The coefficients (30,), in the order of PARAMETER_NAMES."""
         return np.array(astuple(self), dtype=float)
+
+    def process(
+        self,
+        noise: Array,
+        *,
+        integrator: Integrator = "midpoint",
+        max_substep: float = MAX_SUBSTEP,
+        biases: Biases = (),
+    ) -> "PlanarProcess":
+        """The vehicle as a ProcessModel; arguments as of `PlanarProcess`."""
+        return PlanarProcess(self, noise, integrator=integrator, max_substep=max_substep, biases=biases)
+
+    def steady_surge(self, shaft_speed: float) -> float:
+        """Surge [m/s] at which thrust and drag balance on a straight course; 0 if the thrust is astern.
+
+        Raises:
+            ParameterError: The parameters have thrust but no drag.
+        """
+        n = shaft_speed
+        a, b, c = self.X_uu, self.X_u + self.X_nu * abs(n), self.X_prop + self.X_nn * n * abs(n)
+        if c <= 0.0:
+            return 0.0
+        if a < 0.0:
+            return (-b - math.sqrt(b * b - 4.0 * a * c)) / (2.0 * a)
+        if a == 0.0 and b < 0.0:
+            return -c / b
+        raise ParameterError(f"thrust {c:g} N meets no drag: X_uu {a:g} or X_u {self.X_u:g} must be below 0")
+
+
+class Dynamics(Protocol):
+    """A vehicle in the plane as filters believe it, whatever its structure; also `terms.TermsMotion` keeps to it."""
+
+    def process(
+        self, noise: Array, *, integrator: Integrator = ..., max_substep: float = ..., biases: Biases = ...
+    ) -> ProcessModel:
+        """The vehicle as a ProcessModel; arguments as of `PlanarProcess`."""
+        ...
+
+    def steady_surge(self, shaft_speed: float) -> float:
+        """Surge [m/s] at which thrust and drag balance on a straight course."""
+        ...
 
 
 PARAMETER_NAMES = tuple(field.name for field in fields(PlanarParameters))

@@ -8,20 +8,19 @@ starboard one, and a side thruster's speed, positive where it pushes to starboar
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from types import ModuleType
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import casadi as ca
 import numpy as np
 
-from estimators.core import loops
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.kernels import step_kernels
 from estimators.core.types import Array, ProcessModel
-from estimators.planar.model import MAX_SUBSTEP, PlanarParameters
+from estimators.planar.model import MAX_SUBSTEP, Biases, Integrator, PlanarParameters
 
 INPUTS = 6
 
@@ -190,65 +189,67 @@ def accelerations(nu: ca.SX, inputs: ca.SX, coefficients: ca.SX) -> ca.SX:
 
 
 @lru_cache
-def step_function() -> ca.Function:
-    """One step (x, u, p, h) -> (x', F = dx'/dx) of the planar model's eight states, by the midpoint rule."""
-    x, u, p, h = ca.SX.sym("x", 8), ca.SX.sym("u", INPUTS), ca.SX.sym("p", len(PARAMETERS)), ca.SX.sym("h")
+def step_function(integrator: Integrator = "midpoint", biases: Biases = ()) -> ca.Function:
+    """One step (x, u, p, h) -> (x', F = dx'/dx) of the planar model's eight states, and of `biases` behind them."""
+    x, u = ca.SX.sym("x", 8 + len(biases)), ca.SX.sym("u", INPUTS)
+    p, h = ca.SX.sym("p", len(PARAMETERS)), ca.SX.sym("h")
 
     def slope(x: ca.SX) -> ca.SX:
         cosine, sine = ca.cos(x[2]), ca.sin(x[2])
         north, east = cosine * x[3] - sine * x[4] + x[6], sine * x[3] + cosine * x[4] + x[7]
-        return ca.vertcat(north, east, x[5], accelerations(x[3:6], u, p), ca.SX(2, 1))
+        l = accelerations(x[3:6], u, p)
+        if "surge" in biases:
+            l[0] += x[8 + biases.index("surge")]
+        return ca.vertcat(north, east, x[5], l, ca.SX(x.numel() - 6, 1))
 
-    following = x + h * slope(x + h / 2 * slope(x))
-    return ca.Function("planar_terms8", [x, u, p, h], ca.cse([following, ca.jacobian(following, x)]))
+    change = slope(x)
+    if integrator == "midpoint":
+        change = slope(x + h / 2 * change)
+    following = x + h * change
+    moving = ("surge",) if "surge" in biases else ()  # the others only stand there
+    name = "_".join((f"planar_terms{x.numel()}", *moving, integrator))
+    return ca.Function(name, [x, u, p, h], ca.cse([following, ca.jacobian(following, x)]))
 
 
 @lru_cache
-def kernels() -> ModuleType:
+def kernels(integrator: Integrator = "midpoint", biases: Biases = ()) -> ModuleType:
     """The compiled functions of `kernels.step_kernels`; they compile at their first call."""
-    return step_kernels(step_function(), wrapped=(2,))
+    return step_kernels(step_function(integrator, biases), wrapped=(2,))
 
 
-class MotionModel(ProcessModel, Protocol):
-    """What a filter needs of a planar motion, whatever its structure; `PlanarProcess` and `TermsProcess` keep to it.
-
-    The state is [north, east, heading, u, v, r, current north, current east].
-    """
-
-    noise: Array  # (8,) power spectral densities of the process noise
-
-    def propagate(self, mean: Array, covariance: Array, u: Sequence[float], dt: float) -> tuple[Array, Array, int]:
-        """Mean and covariance after `dt` [s] with the input held, and the substeps it took."""
-        ...
-
-    def move(self, points: Array, u: Sequence[float], dt: float) -> Array:
-        """States (k, 8) after `dt`, each from one of `points`."""
-        ...
-
-    def wrap_angles(self, mean: Array) -> Array:
-        """The state with its heading in (-pi, pi]."""
-        ...
-
-
-class TermsProcess:
+class TermsProcess(ProcessModel):
     """A structure's motion as a ProcessModel.
+
+    Its state is [north, east, heading, u, v, r, current north, current east], then the biases.
 
     Args:
         coefficients: By PARAMETERS; a term that is left out is zero, a limit none.
-        noise: Power spectral densities (8,) of the process noise.
+        noise: Power spectral densities (8,) of the process noise, then one of each bias.
+        integrator: "midpoint" or "euler".
         max_substep: Longest substep [s].
+        biases: Those in the state, as of `PlanarProcess`.
 
     Raises:
         ParameterError: An unknown term, a coefficient or density that cannot be.
     """
 
-    def __init__(self, coefficients: dict[str, float], noise: Array, *, max_substep: float = MAX_SUBSTEP) -> None:
+    angles = (2,)  # the heading
+
+    def __init__(
+        self,
+        coefficients: Mapping[str, float],
+        noise: Array,
+        *,
+        integrator: Integrator = "midpoint",
+        max_substep: float = MAX_SUBSTEP,
+        biases: Biases = (),
+    ) -> None:
         self.noise = np.array(noise, dtype=float)
-        if self.noise.shape != (8,) or not (self.noise >= 0.0).all():
-            raise ParameterError(f"process noise {noise} must be 8 power spectral densities >= 0")
+        if self.noise.shape != (8 + len(biases),) or not (self.noise >= 0.0).all():
+            raise ParameterError(f"process noise {noise} must be {8 + len(biases)} power spectral densities >= 0")
         self._p = vector(coefficients)
         self._max_substep = max_substep
-        self._kernels = kernels()
+        self._kernels = kernels(integrator, biases)
 
     def propagate(self, mean: Array, covariance: Array, u: Sequence[float], dt: float) -> tuple[Array, Array, int]:
         """Mean and covariance after `dt` in one compiled call, and the substeps it took.
@@ -264,13 +265,13 @@ class TermsProcess:
 
     def evaluate(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """State after `dt` [s] with the input held."""
-        return self.propagate(x, np.zeros((8, 8)), u, dt)[0]
+        return self.propagate(x, np.zeros((x.size, x.size)), u, dt)[0]
 
     def jacobian(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """Derivative of `evaluate`: the product of the substeps' Jacobians."""
         substeps = self._substeps(dt)
-        total, F = np.eye(8), np.zeros((8, 8))
-        x, following = np.array(x, dtype=float), np.empty(8)
+        total, F = np.eye(x.size), np.zeros((x.size, x.size))
+        x, following = np.array(x, dtype=float), np.empty(x.size)
         for _ in range(substeps):
             self._kernels.step(x, _inputs(u), self._p, dt / substeps, following, F)
             total, x, following = F @ total, following, x
@@ -278,25 +279,58 @@ class TermsProcess:
 
     def covariance(self, x: Array, u: Sequence[float], dt: float) -> Array:
         """Noise gathered over `dt`."""
-        return self.propagate(x, np.zeros((8, 8)), u, dt)[1]
+        return self.propagate(x, np.zeros((x.size, x.size)), u, dt)[1]
 
     def move(self, points: Array, u: Sequence[float], dt: float) -> Array:
-        """States (k, 8) after `dt`, each from one of `points`; angles are not wrapped."""
+        """States (k, n) after `dt`, each from one of `points`; angles are not wrapped."""
         moved = np.array(points, dtype=float)
         self._kernels.move(moved, _inputs(u), self._p, dt, self._substeps(dt))
         return moved
-
-    def wrap_angles(self, mean: Array) -> Array:
-        """The state with its heading in (-pi, pi]."""
-        wrapped = mean.copy()
-        wrapped[2] = loops.wrap(wrapped[2])
-        return wrapped
 
     def _substeps(self, dt: float) -> int:
         return max(1, math.ceil(dt / self._max_substep - 1e-9))
 
 
-def vector(coefficients: dict[str, float]) -> Array:
+@dataclass(frozen=True, kw_only=True, slots=True)
+class TermsMotion:
+    """A vehicle of any structure, as filters believe it (`model.Dynamics`)."""
+
+    coefficients: Mapping[str, float]  # by PARAMETERS
+
+    def process(
+        self,
+        noise: Array,
+        *,
+        integrator: Integrator = "midpoint",
+        max_substep: float = MAX_SUBSTEP,
+        biases: Biases = (),
+    ) -> TermsProcess:
+        """The vehicle as a ProcessModel; arguments as of `TermsProcess`."""
+        return TermsProcess(
+            self.coefficients, noise, integrator=integrator, max_substep=max_substep, biases=biases
+        )  # fmt: skip
+
+    def steady_surge(self, shaft_speed: float) -> float:
+        """Surge [m/s] at which thrust and drag balance on a straight course; 0 if the thrust is astern.
+
+        No more than the limit for which surge is known: there the model holds the vehicle.
+        """
+        c, n = self.coefficients, shaft_speed
+        straight = PlanarParameters(
+            m=1.0, I_z=1.0, X_prop=c.get("surge 1", 0.0), X_u=c.get("surge u", 0.0), X_uu=c.get("surge u|u|", 0.0),
+            X_nn=c.get("surge n|n|", 0.0), X_nu=c.get("surge |n|u", 0.0),
+        )  # fmt: skip
+        limit = c.get("surge limit", math.inf)
+        try:
+            found = straight.steady_surge(n)
+        except ParameterError:  # drag that grows with surge is none of this model's
+            found = limit
+        if not math.isfinite(found):
+            raise ParameterError(f"thrust at {n:g} rad/s meets no drag, and surge has no limit")
+        return min(found, limit)
+
+
+def vector(coefficients: Mapping[str, float]) -> Array:
     """Values (parameters,) in the order of PARAMETERS; terms left out are zero, limits left out infinite.
 
     Raises:

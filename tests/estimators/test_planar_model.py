@@ -9,7 +9,6 @@ import pytest
 from docking_runs import STEADY_RUDDER, accelerations, steady_circle
 
 from estimators.core.errors import NotFiniteError, ParameterError
-from estimators.docking.models import steady_surge
 from estimators.planar import model as planar_model
 from estimators.planar.model import PARAMETER_NAMES, PRESTERO, PlanarParameters, PlanarProcess, step_function
 
@@ -192,11 +191,11 @@ def test_heading_stays_wrapped():
 
 
 def test_steady_surge_balances_thrust_and_drag():
-    assert steady_surge(PRESTERO, 0.0) == pytest.approx(0.8, abs=1e-4)  # 1.037 = 1.62 * 0.8^2
+    assert PRESTERO.steady_surge(0.0) == pytest.approx(0.8, abs=1e-4)  # 1.037 = 1.62 * 0.8^2
     driven = replace(PRESTERO, X_prop=0.0, X_nn=1e-4, X_nu=-2e-3, X_u=-0.5)
-    u = steady_surge(driven, 150.0)
+    u = driven.steady_surge(150.0)
     assert casadi_accelerations([u, 0.0, 0.0], 0.0, 150.0, driven)[0] == pytest.approx(0.0, abs=1e-12)
-    assert steady_surge(driven, -150.0) == 0.0
+    assert driven.steady_surge(-150.0) == 0.0
 
 
 def test_bad_parameters_and_inputs_are_refused_by_name():
@@ -207,7 +206,7 @@ def test_bad_parameters_and_inputs_are_refused_by_name():
     with pytest.raises(ParameterError, match="there are euler, midpoint"):
         PlanarProcess(PRESTERO, NO_NOISE, integrator="rk4")  # pyright: ignore[reportArgumentType]
     with pytest.raises(ParameterError, match="no drag"):
-        steady_surge(PlanarParameters(m=1.0, I_z=1.0, X_prop=1.0), 0.0)
+        PlanarParameters(m=1.0, I_z=1.0, X_prop=1.0).steady_surge(0.0)
     with pytest.raises(NotFiniteError, match="not finite"):
         PlanarProcess(PRESTERO, NO_NOISE).propagate(np.full(8, math.nan), np.eye(8), INPUT, 0.5)
 

@@ -25,9 +25,10 @@ from auvsim.identification.motion.uncertainty import halves, of_left_out
 from auvsim.identification.pipeline import Identification
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
-from auvsim.physics import planar_sets
+from auvsim.physics import motion_models, planar_sets
 from estimators.core import ekf
-from estimators.core.types import Gaussian
+from estimators.core.errors import ParameterError
+from estimators.core.types import Gaussian, ProcessModel
 from estimators.planar.model import PlanarParameters, PlanarProcess
 from estimators.planar.terms import (
     ASYMMETRY,
@@ -35,7 +36,7 @@ from estimators.planar.terms import (
     LIMITS,
     PLANAR,
     STRUCTURES,
-    MotionModel,
+    TermsMotion,
     TermsProcess,
     planar_parameters,
     structure,
@@ -317,8 +318,8 @@ def test_the_report_begins_with_trust(found: MotionIdentification) -> None:
 def test_a_model_is_read_as_it_was_written(found: MotionIdentification, tmp_path: Path) -> None:
     """Bit for bit, and a filter moves by it as the fit does; what cannot be is refused in one line."""
     model = files.motion_model(found)
-    files.write(model, tmp_path / "m.yaml")
-    assert files.read(tmp_path / "m.yaml") == model
+    motion_models.write(model, tmp_path / "m.yaml")
+    assert motion_models.read(tmp_path / "m.yaml") == model
     process = model.process()
     x = np.array([0.0, 0.0, 0.1, 0.9, 0.05, 0.01, 0.0, 0.0])
     own = TermsProcess(found.fit.coefficients, np.zeros(8))
@@ -328,7 +329,7 @@ def test_a_model_is_read_as_it_was_written(found: MotionIdentification, tmp_path
     (tmp_path / "wrong.yaml").write_text(text)
     if "yaw udu" in text:
         with pytest.raises(InputError, match="no such term"):
-            files.read(tmp_path / "wrong.yaml")
+            motion_models.read(tmp_path / "wrong.yaml")
 
 
 def test_a_filter_believes_any_structure(found: MotionIdentification, runs: list[tanker.Run]) -> None:
@@ -337,9 +338,9 @@ def test_a_filter_believes_any_structure(found: MotionIdentification, runs: list
     Before each fix the chosen model is off by less than half of what a vehicle that goes on as it began would be, and
     its innovations are of the size it believes, within a factor of four.
     """
-    chosen: MotionModel = files.motion_model(found).process(current=1e-8)
-    still: MotionModel = TermsProcess({}, chosen.noise)
-    planar: MotionModel = PlanarProcess(planar_parameters({"yaw uud": 0.01, "yaw r": -0.1}), chosen.noise)
+    chosen: ProcessModel = files.motion_model(found).process(current=1e-8)
+    still: ProcessModel = TermsProcess({}, chosen.noise)
+    planar: ProcessModel = PlanarProcess(planar_parameters({"yaw uud": 0.01, "yaw r": -0.1}), chosen.noise)
     truth, times = runs[3].truth, runs[3].times
     signals = baselines.signals(runs[3])
     off = {}
@@ -393,10 +394,44 @@ def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, caps
     assert cli.main([*trial, "--estimator.model", believed]) == 0
     captured = capsys.readouterr()
     assert "not docked within 20 s" in captured.out
-    named = tmp_path / "named.yaml"
-    named.write_text((tmp_path / "o" / "parameters.yaml").read_text().replace("vehicle: vehicle", "vehicle: lauv"))
-    assert cli.main([*trial, "--estimator.model", str(named)]) == 2
-    assert "these are parameters of 'lauv', not of 'remus100'" in capsys.readouterr().err
+    for name in ("parameters.yaml", "motion_model.yaml"):
+        named = tmp_path / "named.yaml"
+        named.write_text((tmp_path / "o" / name).read_text().replace("vehicle: vehicle", "vehicle: lauv"))
+        assert cli.main([*trial, "--estimator.model", str(named)]) == 2
+        assert "these are parameters of 'lauv', not of 'remus100'" in capsys.readouterr().err
+
+
+def test_docking_believes_a_motion_model(found: MotionIdentification, tmp_path: Path) -> None:
+    """A trial's filter takes the file of another structure by the same contract as a planar set."""
+    path = tmp_path / "motion_model.yaml"
+    motion_models.write(files.motion_model(replace(found, name="remus100")), path)
+    believed = motion_models.assumed(str(path), "remus100", 1.0)
+    assert isinstance(believed, TermsMotion)
+    trial = ["dock", "--seed", "3", "--duration", "12", "--no-video", "--out", str(tmp_path / "dock")]
+    assert cli.main([*trial, "--estimator.model", str(path)]) == 0
+    with pytest.raises(InputError, match="no parameter file"):
+        motion_models.assumed(str(tmp_path / "none.yaml"), "remus100", 1.0)
+
+
+def test_filters_take_both_kinds_of_model_alike() -> None:
+    """Planar parameters and the same as terms, with a bias of thrust and others behind it: the same to rounding."""
+    chosen = {label: (-1.0) ** k * (0.1 + 0.03 * k) for k, label in enumerate(sorted(PLANAR))}
+    chosen |= {"surge u|u|": -0.4, "surge u": -0.1, "surge n|n|": 1e-4, "surge |n|u": -1e-3, "surge 1": 0.05}
+    planar, terms = planar_parameters(chosen), TermsMotion(coefficients=chosen)
+    biases = ("surge", "compass")
+    x = np.array([1.0, 2.0, 3.1, 1.1, -0.2, 0.15, 0.1, -0.2, 0.03, 0.01])
+    P, noise = 0.01 * np.eye(10) + 0.001, np.linspace(1e-4, 1e-3, 10)
+    for integrator in ("midpoint", "euler"):
+        options = {"integrator": integrator, "biases": biases}
+        ones, others = (m.process(noise, **options).propagate(x, P, (0.2, 50.0), 0.5) for m in (planar, terms))
+        for one, other in zip(ones, others, strict=True):
+            np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-12)
+    for n in (0.0, 40.0, 80.0, -40.0):
+        assert terms.steady_surge(n) == planar.steady_surge(n)
+    growing = TermsMotion(coefficients={"surge u|u|": 0.1, "surge n|n|": 1e-4, "surge limit": 1.7})
+    assert growing.steady_surge(50.0) == 1.7
+    with pytest.raises(ParameterError, match="meets no drag"):
+        TermsMotion(coefficients={"surge u|u|": 0.1, "surge n|n|": 1e-4}).steady_surge(50.0)
 
 
 def test_the_page_shows_names_as_text(found: MotionIdentification) -> None:

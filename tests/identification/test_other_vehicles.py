@@ -11,11 +11,12 @@ import usv
 
 from auvsim import cli
 from auvsim.base.errors import InputError
-from auvsim.identification.motion import data, files, fit
+from auvsim.identification.motion import data, fit
 from auvsim.identification.motion.choice import Folds
 from auvsim.identification.motion.identify import identify_motion
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
+from auvsim.physics import motion_models
 from estimators.planar.terms import LABELS, STRUCTURES, THRUSTER, TWIN, TermsProcess, structure
 
 SEA = tanker.Sea(disturbance=2e-3, lag=0.0, filtered=0.0)
@@ -54,7 +55,7 @@ def test_the_command_takes_two_shafts(logs: list[Path], tmp_path: Path, capsys: 
     """A model that a filter takes with all its inputs; one shaft alone is no pair, and says which is lacking."""
     out = tmp_path / "o"
     assert cli.main(["identify", str(logs[1]), "--out", str(out), "--quick"]) == 0
-    process = files.read(out / files.NAME).process()
+    process = motion_models.read(out / motion_models.NAME).process()
     x = np.array([0.0, 0.0, 0.0, 1.2, 0.0, 0.0, 0.0, 0.0])
     turned = [process.evaluate(x, (0.0, 80.0, 0.0, 0.0, apart, 0.0), 2.0)[5] for apart in (20.0, -20.0)]
     assert turned[0] > 0.02
@@ -140,3 +141,16 @@ def test_a_rudder_that_stays_is_refused_unless_shafts_steer(logs: list[Path]) ->
     still = replace(record, thrusters=np.zeros_like(record.thrusters))
     with pytest.raises(InputError, match="the rudder stays"):
         identify_motion(replace(readings, records=(still,)))
+
+
+def test_few_stretches_count_by_what_they_are_worth() -> None:
+    """Whole records of two make no jackknife: then intervals are those of the squares, by what these are worth."""
+    runs = [tanker.sail(kind, 4, SEA._replace(disturbance=2e-4), 100.0, ship=mariner.ship(4)) for kind in KINDS[1:3]]
+    motions = [_motion(run) for run in runs]
+    kept = structure("few", "1 u|u| n|n|", "v ur uud", "v r uud")
+    first = fit.least_squares(motions, kept)
+    found = fit.segments(motions, [first], fit.STEPS[3])
+    assert len(found.blocks) == 2
+    assert found.worth == pytest.approx(fit.ALIKE * motions[0].duration)
+    alone = found.worth / np.diag(found.information)  # each variance if the others were known: the least that it can be
+    assert (np.diag(fit.covariance(found)) > 0.99 * alone).all()

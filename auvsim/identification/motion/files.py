@@ -1,75 +1,16 @@
-"""The file of a motion model: what a filter needs to believe it, and where it came from."""
+"""What an identification leaves in files: the motion model, the nearest planar set, intervals."""
 
 import math
-from pathlib import Path
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
 
 import auvsim
-from auvsim.base import model_file
-from auvsim.base.settings import Settings
 from auvsim.identification.motion.identify import MotionIdentification, planar, verdicts
-from auvsim.physics.planar_sets import HoldOut, Noise, PlanarSet, Source, coefficients
+from auvsim.physics.motion_models import Judged, MotionModel, Value
+from auvsim.physics.planar_sets import HoldOut, Noise, PlanarSet, coefficients
 from estimators.core.types import Array
 from estimators.planar.model import PlanarParameters
-from estimators.planar.terms import AXES, LABELS, LIMITS, TermsProcess
-
-NAME = "motion_model.yaml"
-
-
-class Value(Settings):
-    """One coefficient: an acceleration by its term, in SI units."""
-
-    value: float
-    interval: tuple[float, float] = Field(description="95 % interval")
-
-
-class Judged(Settings):
-    """How the model predicts over one horizon, open loop."""
-
-    seconds: float = Field(gt=0, description="length of each prediction [s]")
-    predictions: int = Field(gt=0, description="how many")
-    share: float = Field(ge=0, description="error of the position at the end relative to the distance run, rms [-]")
-    inside: float = Field(ge=0, le=1, description="share of the positions inside their 95 % band [-]")
-
-
-class MotionModel(Settings):
-    """A motion model of one vehicle."""
-
-    format: Annotated[int, Field(ge=1, le=1, description="version of this layout")] = 1
-    trust: str = Field(description="how far one may trust it")
-    vehicle: str
-    structure: str
-    method: str
-    version: str = Field(description="of auvsim")
-    coefficients: dict[str, Value] = Field(
-        description="by term; surge, sway [m/s2] and yaw [rad/s2] by the term's unit"
-    )
-    limits: dict[str, float] = Field(description="largest velocities the terms are known for [m/s, m/s, rad/s]")
-    noise: dict[str, float] = Field(description="densities of the process noise [m2/s3, m2/s3, rad2/s3]")
-    velocity_lag: float = Field(description="of the log's velocities behind its positions [s]")
-    yaw_rate_lag: float = Field(description="of the log's yaw rate behind its heading [s]")
-    judged: tuple[Judged, ...]
-    verdict: tuple[str, ...]
-    sources: tuple[Source, ...]
-
-    @model_validator(mode="after")
-    def _terms_are_known(self) -> "MotionModel":
-        for key, names, known in (("coefficients", self.coefficients, LABELS), ("limits", self.limits, LIMITS)):
-            for name in names:
-                if name not in known:
-                    raise ValueError(f"{key}.{name}: no such term; there are {', '.join(known)}")
-        if set(self.noise) != set(AXES):
-            raise ValueError(f"noise: give {', '.join(AXES)}")
-        return self
-
-    def process(self, position: float = 0.0, heading: float = 0.0, current: float = 0.0) -> TermsProcess:
-        """The model as a filter takes it; densities of position, heading and current besides its own."""
-        noise = [position, position, heading, *(self.noise[axis] for axis in AXES), current, current]
-        values = {name: found.value for name, found in self.coefficients.items()} | self.limits
-        return TermsProcess(values, noise)  # pyright: ignore[reportArgumentType]
+from estimators.planar.terms import AXES, LIMITS
 
 
 def motion_model(found: MotionIdentification) -> MotionModel:
@@ -121,26 +62,6 @@ def planar_set(found: MotionIdentification, masses: PlanarParameters | None = No
         ),
         verdict=(found.trust,), parameters=coefficients(parameters, {}), noise=Noise(**densities),
     )  # fmt: skip
-
-
-def write(model: MotionModel, path: Path) -> None:
-    """Writes a model, whole or not at all; `read` gives it back bit for bit.
-
-    Raises:
-        InputError: If it cannot be written.
-    """
-    values = model.model_dump(mode="json")
-    own = values.pop("coefficients")
-    model_file.write(path, values, "coefficients", own)
-
-
-def read(path: Path) -> MotionModel:
-    """Reads a model.
-
-    Raises:
-        InputError: One line with the file, the line and the key at fault.
-    """
-    return model_file.read(path, MotionModel, "a motion model")
 
 
 def intervals(found: MotionIdentification) -> list[tuple[str, float, float, float]]:

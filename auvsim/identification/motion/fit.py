@@ -350,7 +350,7 @@ def covariance(fit: MotionFit) -> Array:
 
     Leaving out a stretch moves the coefficients by (H - H_b)^-1 g_b to first order; the spread of these bears residuals
     that are neither white nor of the size believed. Where stretches are few it is no smaller than that of the weighted
-    least squares itself.
+    least squares itself; of less than three it is that, by what their squares are worth.
     """
     if fit.known is not None:
         return fit.known
@@ -362,7 +362,7 @@ def covariance(fit: MotionFit) -> Array:
         if np.any(gradient):
             moves.append(-invert(H - part) @ gradient)
     if len(moves) < 3:
-        return invert(fit.information)
+        return fit.worth * invert(fit.information)
     away = np.array(moves)
     count = len(away)
     spread = (count - 1) / count * (away - away.mean(axis=0)).T @ (away - away.mean(axis=0))
