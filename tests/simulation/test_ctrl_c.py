@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,14 @@ from auvsim.data.recorder import Recorder
 from auvsim.missions.docking.guidance import Docking
 from auvsim.simulation import sampling, scenario
 from auvsim.simulation.run import run
+
+
+@pytest.fixture(autouse=True)
+def as_in_a_terminal() -> Iterator[None]:
+    """Ctrl-C is heard, also where the tests run in the background of a script, which then ignores it."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
 
 
 def short(duration: float = 30.0) -> scenario.Scenario:
