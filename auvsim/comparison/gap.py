@@ -25,7 +25,13 @@ GRADED = 60.0  # horizon of the grade [s]; the longest there is where a record i
 VELOCITIES = ("surge", "sway", "yaw rate")
 CANDIDATES = (*DEFAULT_FREE, "X_ud", "Y_vd", "N_rd")
 FLOOR = np.array([0.02, 0.03, math.radians(0.2)])  # residuals that no coefficient is sought for [m/s, m/s, rad/s]
-NEAR = 0.03  # share explained by which two coefficients are not told apart
+# Of the floor, what smoothing, servos and the planar model's own lack may leave that looks like a change of a
+# coefficient: half of it over an equal REMUS-100.
+SYSTEMATIC = 0.5
+PLAUSIBLE = 1.0  # a coefficient that vanishes or doubles; larger changes stand for something else
+ITERATIONS = 3  # of the change that explains most: the motion is not linear in it
+LEAST_SHARE = 0.2  # explained, for a coefficient to be named
+NEAR = 0.1  # share explained by which two coefficients are not told apart
 BLOCK, DRAWS = 20.0, 200  # of the bootstrap [s]
 
 
@@ -69,8 +75,8 @@ class Gap:
     errors: dict[float, float]  # rms over starts by the distance run, by horizon [s]
     planar_errors: dict[float, float]
     starts: int
-    explanations: tuple[Explanation, ...]  # all candidates, the best first
-    size: Array  # (3,) rms of the residuals in surge, sway [m/s] and yaw rate [rad/s]
+    explanations: tuple[Explanation, ...]  # by the plausible candidates, the best first
+    size: Array  # (3,) rms of the residuals in surge, sway [m/s] and yaw rate [rad/s], see `cleared`
     grade: str
     graded: float  # horizon of the grade [s]
     notes: tuple[str, ...]
@@ -78,10 +84,10 @@ class Gap:
     @property
     def explained(self) -> tuple[Explanation, ...]:
         """The best coefficient and those that cannot be told from it; none where there is nothing to explain."""
-        best = self.explanations[0]
-        if (self.size < FLOOR).all() or best.share < 0.2 or best.low <= 0.0 <= best.high:
+        clear = [e for e in self.explanations if not e.low <= 0.0 <= e.high]
+        if (self.size < FLOOR).all() or not clear or clear[0].share < LEAST_SHARE:
             return ()
-        return tuple(e for e in self.explanations if e.share > best.share - NEAR)
+        return tuple(e for e in clear if e.share > clear[0].share - NEAR)
 
     @property
     def verdict(self) -> str:
@@ -131,7 +137,7 @@ def compare(
     graded = max(h for h in errors if h <= GRADED)
     mean = float(np.mean(np.concatenate([b.measured[:, 3] for b in found])))
     condensed = fit_planar_model(vehicle, max(mean, 0.2)).parameters
-    residuals = np.concatenate([beside.residual for beside in found])
+    residuals = np.concatenate([cleared(beside, beside.residual) for beside in found])
     return Gap(
         vehicle=vehicle, records=tuple(found), planar=tuple(planar), errors=errors,
         planar_errors=by_horizon(planar)[0] if planar else {}, starts=starts,
@@ -177,57 +183,85 @@ def reckoned(beside: Beside, first: int) -> tuple[Array, Array]:
     return np.column_stack([track.real, track.imag]), run
 
 
+def cleared(beside: Beside, values: Array) -> Array:
+    """Residuals or slopes (n, 3) of a record without what its sensors' constant errors may make.
+
+    A log turned from the body's axes shows a share of surge as sway, a gyro's bias a constant yaw rate.
+    """
+    surge = beside.measured[beside.first :, 3]
+    found = values.copy()
+    found[:, 1] -= surge * (surge @ values[:, 1]) / max(float(surge @ surge), 1e-9)
+    found[:, 2] -= values[:, 2].mean()
+    return found
+
+
 def explain(besides: Sequence[Beside], condensed: PlanarParameters) -> tuple[Explanation, ...]:
     """What each coefficient of the planar model alone explains of the residuals, the best first.
 
-    The residuals of surge, sway and yaw rate, each by the rms of its motion, are regressed on the change that a change
-    of the coefficient makes in the planar model's own motion under the same inputs; the interval is by a bootstrap over
-    blocks.
+    The residuals of surge, sway and yaw rate, each by its floor, are regressed on the change that a change of the
+    coefficient makes in the planar model's own motion under the same inputs. The interval is by a bootstrap over
+    blocks, and by what the floor itself may look like. Changes that are not plausible are left out.
     """
-    moving = np.concatenate([b.measured[b.first :, 3:6] for b in besides])
-    scale = np.maximum(np.std(moving, axis=0), 2.0 * FLOOR)
-    residuals = [b.residual / scale for b in besides]
-    found = []
-    for name in CANDIDATES:
-        value = float(getattr(condensed, name))
-        if value == 0.0:
-            continue
-        slopes = [_slope(b, condensed, name, value) / scale for b in besides]
-        if all(np.isfinite(s).all() for s in slopes):
-            found.append(_regressed(name, besides, residuals, slopes))
-    return tuple(sorted(found, key=lambda e: -e.share))
+    residuals = [cleared(b, b.residual) / FLOOR for b in besides]
+    found = [
+        _explained(name, besides, residuals, condensed) for name in CANDIDATES if getattr(condensed, name) != 0.0
+    ]  # fmt: skip
+    return tuple(sorted((e for e in found if e is not None), key=lambda e: -e.share))
 
 
-def _slope(beside: Beside, condensed: PlanarParameters, name: str, value: float) -> Array:
-    """Derivative (m, 3) of the velocities by the coefficient, times its size, by central differences."""
+def _explained(
+    name: str, besides: Sequence[Beside], residuals: Sequence[Array], condensed: PlanarParameters
+) -> Explanation | None:
+    """The change of one coefficient that explains most, by Gauss and Newton; None where it is not plausible."""
+    change = 0.0
+    for _ in range(ITERATIONS):
+        made = [_made(b, condensed, name, change) / FLOOR for b in besides]
+        slopes = [
+            (_made(b, condensed, name, change + 0.05) - _made(b, condensed, name, change - 0.05)) / (0.1 * FLOOR)
+            for b in besides
+        ]  # fmt: skip
+        rest = [residual - own for residual, own in zip(residuals, made, strict=True)]
+        if not all(np.isfinite(values).all() for values in (*slopes, *rest)):
+            return None
+        squares = sum(float((slope**2).sum()) for slope in slopes)
+        if squares <= 0.0:
+            return None
+        step = sum(float((s * r).sum()) for s, r in zip(slopes, rest, strict=True)) / squares
+        change += step
+        if abs(change) > PLAUSIBLE:
+            return None
+    total = sum(float((residual**2).sum()) for residual in residuals)
+    left = [
+        residual - _made(b, condensed, name, change) / FLOOR for b, residual in zip(besides, residuals, strict=True)
+    ]  # fmt: skip
+    reach = 1.96 * _deviation(besides, left, slopes)
+    share = 1.0 - sum(float((own**2).sum()) for own in left) / max(total, 1e-300)
+    return Explanation(name=name, change=change, low=change - reach, high=change + reach, share=share)
+
+
+def _made(beside: Beside, condensed: PlanarParameters, name: str, change: float) -> Array:
+    """What a relative change of a coefficient makes in the planar model's velocities (n, 3)."""
     surge = float(beside.simulated[0, 0])
-    up, down = (
-        in_planar(replace(condensed, **{name: value * (1.0 + part)}), beside.record, surge) for part in (0.05, -0.05)
-    )
-    return (up - down)[beside.first :] / 0.1
+    value = float(getattr(condensed, name))
+    ends = [in_planar(replace(condensed, **{name: value * f}), beside.record, surge) for f in (1.0 + change, 1.0)]
+    return cleared(beside, (ends[0] - ends[1])[beside.first :])
 
 
-def _regressed(
-    name: str, besides: Sequence[Beside], residuals: Sequence[Array], slopes: Sequence[Array]
-) -> Explanation:
-    sums = []  # of each block: slope squared, slope times residual
-    for beside, residual, slope in zip(besides, residuals, slopes, strict=True):
-        edges = np.arange(0, len(residual), max(1, round(BLOCK / beside.record.step)))
+def _deviation(besides: Sequence[Beside], left: Sequence[Array], slopes: Sequence[Array]) -> float:
+    """Standard deviation of a change: of blocks drawn anew, and of what the floor may look like."""
+    sums = []  # of each block: slope squared, slope times what is left
+    for beside, rest, slope in zip(besides, left, slopes, strict=True):
+        edges = np.arange(0, len(rest), max(1, round(BLOCK / beside.record.step)))
         squares = np.add.reduceat((slope**2).sum(axis=1), edges)
-        products = np.add.reduceat((slope * residual).sum(axis=1), edges)
+        products = np.add.reduceat((slope * rest).sum(axis=1), edges)
         sums.append(np.column_stack([squares, products]))
     blocks = np.concatenate(sums)
-    squares, products = blocks.sum(axis=0)
-    total = sum(float((residual**2).sum()) for residual in residuals)
-    if squares <= 0.0 or total <= 0.0:
-        return Explanation(name=name, change=0.0, low=0.0, high=0.0, share=0.0)
     drawn = np.random.default_rng(0).integers(len(blocks), size=(DRAWS, len(blocks)))
     resampled = blocks[drawn].sum(axis=1)
-    low, high = np.percentile(resampled[:, 1] / np.maximum(resampled[:, 0], 1e-300), (2.5, 97.5))
-    return Explanation(
-        name=name, change=float(products / squares), low=float(low), high=float(high),
-        share=float(products**2 / squares / total),
-    )  # fmt: skip
+    chance = float(np.std(resampled[:, 1] / np.maximum(resampled[:, 0], 1e-300)))
+    samples = sum(len(slope) for slope in slopes)
+    size = math.sqrt(float(blocks[:, 0].sum()) / samples)  # in floors
+    return math.hypot(chance, SYSTEMATIC / size)
 
 
 def spectra(besides: Sequence[Beside]) -> list[tuple[Array, Array, Array]]:

@@ -1,55 +1,99 @@
-"""The gap sheet: a changed drag is named, an unchanged vehicle gets the best grade, the lag of a servo is undone."""
+"""The gap sheet: a change is named, an unchanged vehicle gets the best grade, the lag of a servo is undone."""
 
 import math
-import shutil
+import re
+from dataclasses import replace
 from pathlib import Path
 
+import gap_study
 import numpy as np
 import pytest
 
 from auvsim.cli import main
+from auvsim.comparison import gap
 from auvsim.comparison.simulation import _ahead
-from auvsim.data import log as logs
-from auvsim.simulation import scenario
-from auvsim.simulation.run import run
+from auvsim.identification.records import Record
+from auvsim.physics import planar_sets
+from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.simulation.sea_trials import PERIOD
-from auvsim.vehicles import model_files
 
 
-def sailed(path: Path, model: str, seed: int) -> None:
-    """A multisine with steps of speed in a current."""
-    steps = {"speed_steps": [1.2, 1.8, 1.5], "step_time": 25.0}
-    settings = {"kind": "multisine", "duration": 110.0, "approach": 10.0, **steps}
-    on = {"enabled": True}
-    pinned = {
-        "mission": {"kind": "manoeuvre", "manoeuvre": settings},
-        "vehicle": {"model": model, "start": {"range": 150.0, "heading_deg": 70.0, "depth": 12.0}},
-        "current": {"kind": "uniform", "speed": 0.15, "direction_deg": 100.0},
-        "sensors": {"dvl": on, "gyro": on},
-    }
-    logs.write(run(scenario.parse(pinned), seed=seed), path)
+def compared(folder: Path, change: str, factor: float) -> int:
+    """The command on the log of a changed vehicle, against the unchanged model."""
+    model = gap_study.changed(folder, change, factor)
+    gap_study.sailed(folder / "trial.nc", str(model), 6)
+    return main(["compare", str(folder / "trial.nc"), "--vehicle", "remus100", "--out", str(folder / "out")])
 
 
-@pytest.mark.parametrize(("factor", "grade"), [(1.0, "A"), (1.5, "C")])
-def test_changed_drag_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str], factor: float, grade: str):
-    """Half as much again of the hull's axial drag names X_uu; the same vehicle has the best grade and no name."""
-    folder = tmp_path / "own"
-    shutil.copytree(model_files.models_folder() / "remus100", folder)
-    model = folder / "remus100.xml"
-    text, drag = model.read_text(), 'hull_quadratic_damping" data="5.84 '
-    assert drag in text
-    model.write_text(text.replace(drag, f'hull_quadratic_damping" data="{5.84 * factor} '))
-    sailed(tmp_path / "trial.nc", str(model), 6)
-    out = tmp_path / "out"
-    assert main(["compare", str(tmp_path / "trial.nc"), "--vehicle", "remus100", "--out", str(out)]) == 0
+@pytest.mark.parametrize(
+    ("change", "factor", "grade", "named"),
+    [
+        ("equal", 1.0, "A", ""),
+        ("lift", 0.7, "A", "Y_uv"),
+        pytest.param("drag", 1.5, "C", "X_uu", marks=pytest.mark.slow),
+        pytest.param("rudder", 0.7, "", "N_dd", marks=pytest.mark.slow),
+    ],
+)
+def test_a_change_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], change: str, factor: float, grade: str, named: str
+):
+    """The same vehicle has the best grade and no name; a change is named, at first or as one of those alike.
+
+    No change beyond one that makes a coefficient vanish or double is listed, and each has an interval about it.
+    """
+    assert compared(tmp_path, change, factor) == 0
     said = capsys.readouterr().out
-    assert said.startswith(f"grade {grade}")
-    # Three speeds hardly tell drag from thrust and its loss with speed: X_uu is named, at first or as one of these.
-    assert ("X_uu" in said.splitlines()[0]) == (factor > 1.0)
-    assert not any(f"{axis}_" in said.splitlines()[0] for axis in "YN")
-    assert ("no one coefficient" in said) == (factor == 1.0)
-    assert (out / "gap.png").stat().st_size > 20_000
-    assert "<svg" in (out / "gap.html").read_text()
+    first = said.splitlines()[0]
+    assert first.startswith(f"grade {grade}")
+    assert named in first
+    assert ("no one coefficient" in first) == (not named)
+    if named:
+        other = "YN" if named.startswith("X") else "X"
+        assert not any(f"{axis}_" in first.split("explains")[0] for axis in other)
+    changes = [float(text) for text in re.findall(r"^ *[XYN]_\w+ +([+-][0-9.]+)%", said, re.MULTILINE)]
+    assert changes
+    assert all(abs(one) <= 100.0 for one in changes)
+    assert (tmp_path / "out" / "gap.png").stat().st_size > 20_000
+    assert "<svg" in (tmp_path / "out" / "gap.html").read_text()
+
+
+def test_a_planar_model_beside(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """The planar model condensed from the vehicle errs about as MuJoCo does; one with 1.5 times its drag far more."""
+    gap_study.sailed(tmp_path / "trial.nc", "remus100", 6)
+    errors = {}
+    base = fit_planar_model("remus100", 1.5).parameters
+    for name, parameters in (("own", base), ("dragged", replace(base, X_uu=1.5 * base.X_uu))):
+        path = tmp_path / f"{name}.yaml"
+        kept = planar_sets.PlanarSet(
+            vehicle="remus100", speed=1.5, method="condensed", start="none", version="0", sources=(),
+            parameters=planar_sets.coefficients(parameters, {}),
+        )  # fmt: skip
+        planar_sets.write(kept, path)
+        beside = ["compare", str(tmp_path / "trial.nc"), "--vehicle", "remus100", "--parameters", str(path)]
+        assert main([*beside, "--out", str(tmp_path / "out")]) == 0
+        row = next(line for line in capsys.readouterr().out.splitlines() if line.strip().startswith("60 s"))
+        errors[name] = [float(cell) for cell in re.findall(r"([0-9.]+)%", row)]
+    assert errors["own"][0] == errors["dragged"][0]
+    assert errors["own"][1] < 3.0
+    assert errors["dragged"][1] > 4.0
+    assert main(["compare", str(tmp_path / "trial.nc"), "--vehicle", "remus100", "--parameters", "none.yaml"]) == 2
+    assert "none.yaml" in capsys.readouterr().err
+
+
+def test_constant_errors_of_sensors_are_no_change():
+    """A log turned by a degree and a gyro's bias leave nothing; what goes with anything else stays."""
+    n = 400
+    times = 0.1 * np.arange(n)
+    measured = np.zeros((n, 12))
+    measured[:, 3] = 1.5 + 0.3 * np.sin(times)
+    record = Record(name="r", times=times, inputs=np.zeros((n, 2)), measured=np.zeros((n, 8)), deviations=np.ones(8))
+    beside = gap.Beside(record=record, measured=measured, simulated=np.zeros((n, 3)))
+    faulty = np.column_stack([0.02 * np.ones(n), 0.017 * measured[:, 3], 0.005 * np.ones(n)])[beside.first :]
+    left = gap.cleared(beside, faulty)
+    np.testing.assert_allclose(left[:, 1:], 0.0, atol=1e-12)
+    np.testing.assert_array_equal(left[:, 0], faulty[:, 0])
+    swinging = faulty + np.column_stack([0.0 * times, np.cos(3.0 * times), np.cos(3.0 * times)])[beside.first :]
+    assert np.std(gap.cleared(beside, swinging)[:, 1:], axis=0).min() > 0.65
 
 
 def test_lag_is_undone():
