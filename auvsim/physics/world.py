@@ -1,5 +1,6 @@
 """The physical world: n vehicles and n structures in the water, stepped by MuJoCo; gives their true states."""
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -16,6 +17,7 @@ from auvsim.physics.scenes import Scene, pair_name
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
+from auvsim.water.terrain import FlatFloor
 
 # Distances within which contact is looked for at every physics tick [m].
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
@@ -24,6 +26,7 @@ NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
 OVERLAP = 0.001  # depth from which two things that start are inside each other [m]
 LOOKOUT = 0.25  # longest time between two checks of these distances [s]
+SWIFT = NEAR_STRUCTURE / LOOKOUT  # speed beyond any vehicle's, which these presuppose [m/s]
 
 
 class StructureState:
@@ -115,6 +118,8 @@ class World:
         self._fleet = tuple(self._craft.values())
         self._most_ticks = max(1, round(LOOKOUT / model.opt.timestep))
         self._unplaced = set(self.vehicles)
+        self._clear = -math.inf  # time before which nothing can be near [s]
+        self._looks_ahead = data is None and isinstance(scene.terrain, FlatFloor)  # and nobody else moves the vehicles
 
     @property
     def time(self) -> float:
@@ -148,7 +153,8 @@ class World:
 
     def grounded(self, vehicle: str, since: float) -> bool:
         """Whether a vehicle has touched the sea floor after a time [s]."""
-        for contact in reversed(self._recorder.found[vehicle]):
+        found = self._recorder.found[vehicle]
+        for contact in reversed(found) if found else ():
             if contact.time <= since:
                 return False
             if contact.other == SEA_FLOOR:
@@ -166,7 +172,7 @@ class World:
         """Back to time zero: no contact, all latches open, and every vehicle waiting for its place."""
         mujoco.mj_resetData(self.model, self.data)
         self._recorder.clear()
-        self._unplaced = set(self.vehicles)
+        self._unplaced, self._clear = set(self.vehicles), -math.inf
 
     def place(self, vehicle: str, position: Array, heading: float, speed: float, channels: Sequence[float]) -> None:
         """Puts a vehicle level at a place, out of any latch, moving ahead through the water.
@@ -195,6 +201,7 @@ class World:
         craft = self._craft[vehicle]
         craft.place(position, heading, speed * ahead + water, np.asarray(channels, dtype=float))
         craft.refresh_water(self.current, self.time)
+        self._clear = -math.inf
         self._unplaced.discard(vehicle)
         if not self._unplaced:
             mujoco.mj_forward(self.model, self.data)
@@ -260,18 +267,28 @@ class World:
 
     def _is_near(self) -> bool:
         """Whether any vehicle may touch something soon."""
+        if self.data.time < self._clear:
+            return False
         places = [craft.position.tolist() for craft in self._fleet]
-        depth = self.terrain.depth
+        depth, way = self.terrain.depth, math.inf  # the least that a vehicle must move to be near something [m]
         for x, y, z in places:
-            if z < NEAR_FLOOR - depth(x, -y):
+            above = z - (NEAR_FLOOR - depth(x, -y))
+            if above < 0.0:
                 return True
+            way = min(way, above)
             for a, b, c in self._mouths:
-                if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < NEAR_STRUCTURE**2:
+                square = (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2
+                if square < NEAR_STRUCTURE**2:
                     return True
+                way = min(way, math.sqrt(square) - NEAR_STRUCTURE)
         for i, j, reach in self._meetings:
             (x, y, z), (a, b, c) = places[i], places[j]
-            if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < reach:
+            square = (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2
+            if square < reach:
                 return True
+            way = min(way, 0.5 * (math.sqrt(square) - math.sqrt(reach)))
+        if self._looks_ahead:
+            self._clear = self.data.time + way / SWIFT
         return False
 
     def _step(self, ticks: int) -> None:
