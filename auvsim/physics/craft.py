@@ -151,9 +151,9 @@ class Craft:
         extent = np.sqrt(radius * radius * (1.0 - upright) + half * half * upright)
         return bool((level - points[:, 2] < extent).any())
 
-    def truth(self, current: CurrentField) -> Truth:
-        """The true state now, in NED and forward-starboard-down."""
-        time, state = self._data.time, np.empty(16)
+    def truth(self, current: CurrentField, time: float) -> Truth:
+        """The true state, in NED and forward-starboard-down, in the water of a time [s], which is now."""
+        state = np.empty(16)
         _observe(self._pose, self._velocity, state)
         position = state[:3]
         if self._joints_carry:
