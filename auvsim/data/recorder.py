@@ -101,7 +101,11 @@ class Recorder:
         A reading that was lost has NaN for the time it was received.
         """
         # A tuple, which unlike a list the garbage collector does not look through again and again.
-        self.append(self._sensors[vehicle, reading.sensor], reading[1:5] + extra)
+        group = self._sensors[vehicle, reading.sensor]
+        rows = self._rows[group]
+        rows.append(reading[1:5] + extra)
+        if len(rows) >= PACKED:
+            self._pack(group)
 
     def event(self, time: float, vehicle: str, kind: str, text: str) -> None:
         """Appends an event of a vehicle, or of the run as a whole with vehicle ""."""

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import lru_cache
 from types import MappingProxyType
-from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from auvsim.base.frames import Array
 from estimators.core.types import Outcome
@@ -71,8 +71,11 @@ class Estimate:
     def deviation(self, slopes: Mapping[str, float]) -> float:
         """Standard deviation of a quantity that changes by `slopes` with the named states; others do not count."""
         found, block = _block(self.names, tuple(slopes))
-        slope = np.array([slopes[name] for name in found])
-        return math.sqrt(max(float(slope @ self.covariance[block] @ slope), 0.0))
+        if len(found) == 1:  # the common case, cheaply
+            (slope,) = (slopes[name] for name in found)
+            return math.sqrt(max(slope * self.covariance.item(block.item()) * slope, 0.0))
+        along = np.array([slopes[name] for name in found])
+        return math.sqrt(max(float(along @ self.covariance.take(block) @ along), 0.0))
 
     @property
     def horizontal_covariance(self) -> Array:
@@ -90,10 +93,10 @@ class Estimate:
 
 
 @lru_cache(maxsize=64)
-def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, ...], tuple[Any, ...]]:
-    """Those of the states that are wanted, in their order, and the index of their block in a covariance."""
-    places = [k for k, name in enumerate(names) if name in wanted]
-    return tuple(names[k] for k in places), np.ix_(places, places)
+def _block(names: tuple[str, ...], wanted: tuple[str, ...]) -> tuple[tuple[str, ...], NDArray[np.int64]]:
+    """Those k of the states that are wanted, in their order, and places (k, k) of their block in a flat covariance."""
+    places = np.array([k for k, name in enumerate(names) if name in wanted], dtype=np.int64)
+    return tuple(names[k] for k in places), places[:, np.newaxis] * len(names) + places
 
 
 def estimator_events(before: Estimate | None, now: Estimate) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -19,7 +20,7 @@ from auvsim.sensors.imu import ImuSettings
 from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Actuation
-from estimators.core.screening import Limits, Screen
+from estimators.core.screening import Limits, Screen, judge
 from estimators.core.types import Outcome
 
 SURE = 11.0  # deviations of white noise by which two readings never differ: 8 of their difference
@@ -66,15 +67,10 @@ class Gate:
         if reading.stamp > reading.received + CLOCK:
             return "clock"
         values = reading.value.tolist()
-        stamp, reason = reading.stamp, ""
-        pairs = zip(screens, values, strict=False)
         if reading.sensor in self._dvls:  # two tracks, either of which may be lost
-            lost = np.repeat(np.isnan(reading.value.reshape(2, 3)).all(axis=1), 3).tolist()
-            pairs = ((screen, value) for (screen, value), away in zip(pairs, lost, strict=False) if not away)
-        for screen, value in pairs:  # each of them, since each remembers what it was shown
-            found = screen.judge(stamp, value)
-            reason = reason or found
-        return reason
+            heard = np.repeat(~np.isnan(reading.value.reshape(2, 3)).all(axis=1), 3).tolist()
+            screens, values = list(compress(screens, heard)), list(compress(values, heard))
+        return judge(screens, reading.stamp, values)
 
     def passed(self, readings: Sequence[Reading]) -> tuple[list[Reading], list[Outcome]]:
         """Those that may be heard, and the fates of the others."""

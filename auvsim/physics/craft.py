@@ -5,6 +5,7 @@ from collections.abc import Sequence
 
 import mujoco
 import numpy as np
+from numba import njit
 
 from auvsim.base.frames import (
     FLIP,
@@ -22,6 +23,28 @@ from auvsim.physics.truth import Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
 from auvsim.water.surface import surface
+
+
+@njit(cache=True, error_model="numpy")
+def _observe(pose, velocity, state):
+    """Position, quaternion, attitude and body velocity (16,) in NED of MuJoCo's pose (7,) and velocity (6,)."""
+    for k in range(3):
+        state[k] = pose[k] * FLIP[k]
+        state[10 + k], state[13 + k] = velocity[k] * FLIP6[k], velocity[3 + k] * FLIP6[3 + k]
+    for k in range(4):
+        state[3 + k] = pose[3 + k] * FLIP_QUATERNION[k]
+    w, x, y, z = state[3], state[4], state[5], state[6]
+    ww, xx, yy, zz = w * w, x * x, y * y, z * z
+    r00, r01, r02 = ww + xx - yy - zz, 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)
+    r10, r11, r12 = 2.0 * (x * y + w * z), ww - xx + yy - zz, 2.0 * (y * z - w * x)
+    r20, r21, r22 = 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), ww - xx - yy + zz
+    state[7] = math.atan2(r21, r22)
+    state[8] = -math.asin(max(-1.0, min(1.0, r20)))
+    state[9] = math.atan2(r10, r00)
+    u, v, w = state[10], state[11], state[12]
+    state[10] = u * r00 + v * r10 + w * r20
+    state[11] = u * r01 + v * r11 + w * r21
+    state[12] = u * r02 + v * r12 + w * r22
 
 
 class Craft:
@@ -48,7 +71,8 @@ class Craft:
         self.dofs = slice(int(dofs[0]), int(dofs[-1]) + 1)
         positions = [int(at) for at in model.jnt_qposadr[model.dof_jntid[dofs[6:]]]]  # of its hinges
         self._hinges = slice(min(positions), max(positions) + 1) if positions else slice(0, 0)
-        self.position, self._quaternion = data.qpos[q : q + 3], data.qpos[q + 3 : q + 7]
+        self._pose = data.qpos[q : q + 7]
+        self.position, self._quaternion = self._pose[:3], self._pose[3:]
         self._velocity, self.speeds = data.qvel[v : v + 6], data.qvel[self.dofs]
         self._data, self._qpos, self._qvel, self._control = data, data.qpos, data.qvel, data.ctrl
         self._water = data.userdata[slot : slot + WATER]
@@ -75,8 +99,6 @@ class Craft:
         )
         self._strips = x[radius > 0.0], radius[radius > 0.0], half[radius > 0.0]
         self._joints_carry = len(joints) == len(actuators)
-        self._rotation = np.zeros(9)
-        self._matrix = self._rotation.reshape(3, 3)
 
     def place(self, position: Array, heading: float, velocity: Array, channels: Array) -> None:
         """Puts the vehicle level at a place.
@@ -116,7 +138,7 @@ class Craft:
     def surfaced(self) -> bool:
         """Whether any part of the hull is out of the water."""
         water = self._water
-        if water[water_slot.SURFACE] == 0.0 or -self._place[2] + water[water_slot.ELEVATION] > self._reach:
+        if not water.item(water_slot.SURFACE) or water.item(water_slot.ELEVATION) - self._place.item(2) > self._reach:
             return False
         x, radius, half = self._strips
         points = self._place + x[:, np.newaxis] * self._axis
@@ -129,28 +151,16 @@ class Craft:
         extent = np.sqrt(radius * radius * (1.0 - upright) + half * half * upright)
         return bool((level - points[:, 2] < extent).any())
 
-    def truth(self, current: CurrentField) -> Truth:
-        """The true state now, in NED and forward-starboard-down."""
-        time = self._data.time
-        position = self.position * FLIP
-        quaternion = self._quaternion * FLIP_QUATERNION
-        mujoco.mju_quat2Mat(self._rotation, quaternion)
-        r00, _, _, r10, _, _, r20, r21, r22 = self._rotation.tolist()
-        nu = self._velocity * FLIP6
-        over_ground = nu[:3]
-        over_ground[:] = over_ground.dot(self._matrix)
+    def truth(self, current: CurrentField, time: float) -> Truth:
+        """The true state, in NED and forward-starboard-down, in the water of a time [s], which is now."""
+        state = np.empty(16)
+        _observe(self._pose, self._velocity, state)
+        position = state[:3]
         if self._joints_carry:
             actuators = self._qpos.take(self._angles)
         else:
             actuators = self._act.take(self._thrusters) if self._thrusters else self._control.take(self._controls)
         for channel, _, rate in self._turning:
             actuators[channel] = self._qvel[rate]
-        return Truth(
-            time=time,
-            position=position,
-            quaternion=quaternion,
-            attitude=np.array((math.atan2(r21, r22), -math.asin(max(-1.0, min(1.0, r20))), math.atan2(r10, r00))),
-            nu=nu,
-            current=current.evaluate(time, position).velocity,
-            actuators=actuators,
-        )
+        water = current.evaluate(time, position).velocity
+        return Truth(time, position, state[3:7], state[7:10], state[10:], water, actuators)

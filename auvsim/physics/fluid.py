@@ -245,6 +245,12 @@ def _part(kind, c, o, body, water, time, xpos, xmat, cvel, drive, com, cdof, par
     _apply(qfrc, cdof, parent, parent[dof], F0, F1, F2, T0, T1, T2)
 
 
+@njit(cache=True, error_model="numpy")
+def _adds_along_all(c, o):
+    """Whether a hull's added mass shows in the first element of M, which without it is the mass of its tree."""
+    return min(c[o + _MASS], c[o + _MASS + 7], c[o + _MASS + 14]) > 1e-6 * c[o + DENSITY] * c[o + _VOLUME]
+
+
 _make_M = types.ExternalFunction("mj_makeM", types.void(types.intp, types.intp))
 _factor_M = types.ExternalFunction("mj_factorM", types.void(types.intp, types.intp))
 _project = types.ExternalFunction("mj_projectConstraint", types.void(types.intp, types.intp))
@@ -258,7 +264,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
     d_time, d_userdata, d_xpos, d_xmat = data_at["time"], data_at["userdata"], data_at["xpos"], data_at["xmat"]
     d_cvel, d_com, d_cdof = data_at["cvel"], data_at["subtree_com"], data_at["cdof"]
     d_qfrc, d_M, d_qvel = data_at["qfrc_passive"], data_at["M"], data_at["qvel"]
-    d_act, d_ctrl = data_at["act"], data_at["ctrl"]
+    d_act, d_ctrl, d_crb = data_at["act"], data_at["ctrl"], data_at["crb"]
 
     @cfunc(types.void(types.intp, types.intp), cache=True, error_model="numpy")
     def passive(m, d):
@@ -276,6 +282,7 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
         coms, cdof = load_pointer(d + d_com), numbers(load_pointer(d + d_cdof))
         qfrc, M = numbers(load_pointer(d + d_qfrc)), numbers(load_pointer(d + d_M))
         qvel = numbers(load_pointer(d + d_qvel))
+        crb = numbers(load_pointer(d + d_crb))
         act, control = numbers(load_pointer(d + d_act)), numbers(load_pointer(d + d_ctrl))
         J = _scratch()
         touched = False
@@ -287,12 +294,13 @@ def _build(model_at: dict[str, int], data_at: dict[str, int], gravity_at: int) -
             base = weld[body]
             com = numbers(coms + 24 * root[body])
             if kind == HULL_KIND:
+                at = dofadr[base]
                 if not touched:
-                    # Rebuilt here, so that entering twice (mj_forwardSkip, mjd_transitionFD) adds nothing twice.
-                    _make_M(m, d)
+                    # Rebuilt, if need be, so that entering twice (mj_forwardSkip, mjd_transitionFD) adds nothing twice.
+                    if not (_adds_along_all(c, o) and M[rows[at]] == crb[10 * base + 9]):
+                        _make_M(m, d)
                     touched = True
                 gravity = numbers(m + gravity_at)
-                at = dofadr[base]
                 _hull(c, o, body, water, time, gravity, xpos, xmat, cvel, com, cdof, parent, at, qfrc, M, rows, J)
             elif kind in (FIN_KIND, PROPELLER_KIND):
                 dof = dofadr[base] + dofnum[base] - 1

@@ -1,5 +1,6 @@
 """The physical world: n vehicles and n structures in the water, stepped by MuJoCo; gives their true states."""
 
+import math
 from collections.abc import Sequence
 from itertools import combinations
 
@@ -16,6 +17,7 @@ from auvsim.physics.scenes import Scene, pair_name
 from auvsim.physics.truth import StructurePose, Truth
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField
+from auvsim.water.terrain import FlatFloor
 
 # Distances within which contact is looked for at every physics tick [m].
 NEAR_STRUCTURE = 4.0  # from its mouth to a vehicle's origin
@@ -24,6 +26,7 @@ NEAR_FLOOR = 2.0  # from the sea floor to a vehicle's origin
 NEAR_VEHICLE = 2.0  # between two vehicles' origins, beyond half the sum of their lengths
 OVERLAP = 0.001  # depth from which two things that start are inside each other [m]
 LOOKOUT = 0.25  # longest time between two checks of these distances [s]
+SWIFT = NEAR_STRUCTURE / LOOKOUT  # speed beyond any vehicle's, which these presuppose [m/s]
 
 
 class StructureState:
@@ -115,11 +118,15 @@ class World:
         self._fleet = tuple(self._craft.values())
         self._most_ticks = max(1, round(LOOKOUT / model.opt.timestep))
         self._unplaced = set(self.vehicles)
+        self._time = self.data.time  # to ask MjData costs as much as a calculation
+        self._flags = -1  # last set
+        self._clear = -math.inf  # time before which nothing can be near [s]
+        self._looks_ahead = data is None and isinstance(scene.terrain, FlatFloor)  # and nobody else moves the vehicles
 
     @property
     def time(self) -> float:
         """Time since the start [s]."""
-        return self.data.time
+        return self._time
 
     def rays(self, place: Array, directions: Array, reach: float) -> tuple[Array, Array] | None:
         """What rays meet of structures and vehicles, see `rays.cast`; None where none of these is within reach.
@@ -148,7 +155,8 @@ class World:
 
     def grounded(self, vehicle: str, since: float) -> bool:
         """Whether a vehicle has touched the sea floor after a time [s]."""
-        for contact in reversed(self._recorder.found[vehicle]):
+        found = self._recorder.found[vehicle]
+        for contact in reversed(found) if found else ():
             if contact.time <= since:
                 return False
             if contact.other == SEA_FLOOR:
@@ -166,7 +174,7 @@ class World:
         """Back to time zero: no contact, all latches open, and every vehicle waiting for its place."""
         mujoco.mj_resetData(self.model, self.data)
         self._recorder.clear()
-        self._unplaced = set(self.vehicles)
+        self._unplaced, self._clear, self._time = set(self.vehicles), -math.inf, 0.0
 
     def place(self, vehicle: str, position: Array, heading: float, speed: float, channels: Sequence[float]) -> None:
         """Puts a vehicle level at a place, out of any latch, moving ahead through the water.
@@ -195,13 +203,14 @@ class World:
         craft = self._craft[vehicle]
         craft.place(position, heading, speed * ahead + water, np.asarray(channels, dtype=float))
         craft.refresh_water(self.current, self.time)
+        self._clear = -math.inf
         self._unplaced.discard(vehicle)
         if not self._unplaced:
             mujoco.mj_forward(self.model, self.data)
 
     def overlaps(self) -> list[tuple[str, str, float]]:
         """Pairs of vehicles, structures and the sea floor that reach into each other, and how deep [m]."""
-        self._options.disableflags = self._near_flags
+        self._options.disableflags = self._flags = self._near_flags
         mujoco.mj_fwdPosition(self.model, self.data)
         found = []
         for contact in self.data.contact:
@@ -219,7 +228,7 @@ class World:
                 second order in that time.
         """
         for craft in self._fleet:
-            craft.refresh_water(self.current, self.data.time + ahead)
+            craft.refresh_water(self.current, self._time + ahead)
 
     def command(self, vehicle: str, channels: Sequence[float]) -> None:
         """Sets the commands (n,) of a vehicle's actuators, in the order of its channels; each follows with its lag."""
@@ -246,14 +255,16 @@ class World:
         self._advance(ticks)
 
     def _advance(self, ticks: int) -> None:
-        near = self._is_near()
+        near = self._time >= self._clear and self._is_near()
         # Far from everything the search for contacts would find none, and costs a third of a step.
-        self._options.disableflags = self._near_flags if near else self._far_flags
+        flags = self._near_flags if near else self._far_flags
+        if flags != self._flags:
+            self._options.disableflags = self._flags = flags
         if near:
             for _ in range(ticks):
                 self._step_near()
         else:
-            self._step(ticks)
+            self._step(ticks, self._options.timestep)
         for craft in self._fleet:
             if not float(craft.speeds.dot(craft.speeds)) < 1e6:
                 raise DivergenceError(self._diagnosis(craft))
@@ -261,33 +272,41 @@ class World:
     def _is_near(self) -> bool:
         """Whether any vehicle may touch something soon."""
         places = [craft.position.tolist() for craft in self._fleet]
-        depth = self.terrain.depth
+        depth, way = self.terrain.depth, math.inf  # the least that a vehicle must move to be near something [m]
         for x, y, z in places:
-            if z < NEAR_FLOOR - depth(x, -y):
+            above = z - (NEAR_FLOOR - depth(x, -y))
+            if above < 0.0:
                 return True
+            way = min(way, above)
             for a, b, c in self._mouths:
-                if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < NEAR_STRUCTURE**2:
+                square = (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2
+                if square < NEAR_STRUCTURE**2:
                     return True
+                way = min(way, math.sqrt(square) - NEAR_STRUCTURE)
         for i, j, reach in self._meetings:
             (x, y, z), (a, b, c) = places[i], places[j]
-            if (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2 < reach:
+            square = (x - a) * (x - a) + (y - b) * (y - b) + (z - c) ** 2
+            if square < reach:
                 return True
+            way = min(way, 0.5 * (math.sqrt(square) - math.sqrt(reach)))
+        if self._looks_ahead:
+            self._clear = self._time + way / SWIFT
         return False
 
-    def _step(self, ticks: int) -> None:
+    def _step(self, ticks: int, step: float) -> None:
         mujoco.mj_step(self.model, self.data, ticks)
-        step = self._options.timestep
-        self.data.time = round(self.data.time / step) * step  # MuJoCo adds steps up, and with them their rounding
+        # MuJoCo adds steps up, and with them their rounding.
+        self.data.time = self._time = (round(self._time / step) + ticks) * step
 
     def _step_near(self) -> None:
         """One step in which contacts are recorded and latches may close, in substeps where panels ask for them."""
         step = self._options.timestep
         self._options.timestep = step / self._substeps
         for _ in range(self._substeps):
-            self._step(1)
+            self._step(1, step / self._substeps)
             self._watch()
         self._options.timestep = step
-        self.data.time = round(self.data.time / step) * step
+        self.data.time = self._time = round(self._time / step) * step
 
     def _watch(self) -> None:
         """Records contacts, and closes an open latch on a free vehicle whose nose is in the throat."""
@@ -304,10 +323,10 @@ class World:
         worst = int(speeds.argmax())
         joint = self.model.joint(int(self.model.dof_jntid[craft.dofs.start + worst])).name
         return (
-            f"diverged at {self.data.time:.2f} s: joint '{joint}' moves at {speeds[worst]:.3g} (m/s or rad/s); "
+            f"diverged at {self._time:.2f} s: joint '{joint}' moves at {speeds[worst]:.3g} (m/s or rad/s); "
             f"check the model's inertia and damping, or raise rates.physics above {1 / self._options.timestep:.0f} Hz"
         )
 
     def truth(self, vehicle: str) -> Truth:
         """The true state of a vehicle now, in NED and forward-starboard-down."""
-        return self._craft[vehicle].truth(self.current)
+        return self._craft[vehicle].truth(self.current, self._time)

@@ -16,6 +16,8 @@ from auvsim.vehicles.library import Vehicle
 from auvsim.water.currents import CurrentField
 from auvsim.water.terrain import Terrain
 
+_new = tuple.__new__
+
 
 class Surroundings(Protocol):
     """What a sensor may ask of the world beside the truth of its own vehicle; `physics.world.World` is one."""
@@ -88,4 +90,4 @@ class Sensor(ABC):
         """A reading with this time [s] as stamp and arrival, and the next sequence number."""
         sequence = self._sequence
         self._sequence = sequence + 1
-        return Reading(self.name, time, time, value, sequence)
+        return _new(Reading, (self.name, time, time, value, sequence, None))  # half the time of Reading(...)

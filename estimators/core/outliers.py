@@ -5,6 +5,7 @@ As probabilistic data association does with measurements of uncertain origin (Ba
 
 import math
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -90,8 +91,9 @@ def correct(belief: Gaussian, measurement: Measurement, model: MeasurementModel,
     )
 
 
+@lru_cache
 def _spread(deviation: float | tuple[float, ...], size: int) -> Array:
-    """Covariance (m, m) of an outlier's error.
+    """Covariance (m, m) of an outlier's error; to be read only.
 
     Raises:
         ParameterError: There are more or fewer deviations than components.
@@ -105,12 +107,15 @@ def _spread(deviation: float | tuple[float, ...], size: int) -> Array:
 
 def log_density(covariance: Array, residual: Array) -> float:
     """Logarithm of the normal density of a residual (m,) with its covariance (m, m)."""
-    if residual.size == 2:  # the common case, cheaply
+    if residual.size == 2:  # the common cases, cheaply
         (a, b), (_, c) = covariance.tolist()
         x, y = residual.tolist()
         determinant = a * c - b * b
         return -0.5 * ((c * x * x - 2.0 * b * x * y + a * y * y) / determinant + math.log(determinant)) - math.log(
             2.0 * math.pi
         )
+    if residual.size == 1:
+        variance, x = covariance.item(), residual.item()
+        return -0.5 * (x * (x / variance) + math.log(2.0 * math.pi * variance))
     _, logarithm = np.linalg.slogdet(2.0 * math.pi * covariance)
     return -0.5 * float(residual @ np.linalg.solve(covariance, residual) + logarithm)

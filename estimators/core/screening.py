@@ -1,6 +1,8 @@
 """One gate for every scalar sensor: values no filter should see are refused by name, before any model sees them."""
 
 import math
+import sys
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from estimators.core.errors import ParameterError
@@ -22,6 +24,24 @@ class Limits:
             raise ParameterError(f"limits {self} must have low < high, and rate and frozen above 0")
 
 
+LARGEST = sys.float_info.max
+
+
+def judge(screens: Iterable["Screen"], stamp: float, values: Iterable[float]) -> str:
+    """The reason to refuse a reading of several components at a stamp [s], each with its screen; "" if there is none.
+
+    All of them are shown to their screens, since each remembers what it was shown.
+    """
+    reason, known = "", stamp <= LARGEST
+    for screen, value in zip(screens, values, strict=False):
+        if known and screen._lowest <= value <= screen._highest and stamp > screen._latest:  # the common case, cheaply
+            screen._latest = stamp
+        else:
+            found = screen.judge(stamp, value)
+            reason = reason or found
+    return reason
+
+
 class Screen:
     """Judges the values of one scalar sensor, in order of arrival.
 
@@ -40,6 +60,9 @@ class Screen:
         self._shown = math.nan
         self._latest = -math.inf  # stamp
         self._remembers = limits.rate < math.inf or limits.frozen < math.inf  # else no value depends on those before
+        # Finite values between these need no further look, if it remembers nothing.
+        self._lowest = math.inf if self._remembers else max(limits.low, -LARGEST)
+        self._highest = min(limits.high, LARGEST)
 
     def judge(self, stamp: float, value: float) -> str:
         """The reason to refuse a value that was true at `stamp` [s]; "" if there is none."""

@@ -45,3 +45,16 @@ def test_an_error_ends_it():
     with pytest.raises(KeyError), frozen_garbage():
         raise KeyError
     assert gc.get_freeze_count() == 0
+
+
+@pytest.mark.parametrize("thresholds", [(700, 10, 10), (50_000, 5, 5), (0, 10, 10)])
+def test_a_loop_is_looked_through_seldom_and_never_oftener_than_the_user_wants(thresholds):
+    before = gc.get_threshold()
+    gc.set_threshold(*thresholds)
+    try:
+        with frozen_garbage():
+            within = gc.get_threshold()
+        assert gc.get_threshold() == thresholds
+    finally:
+        gc.set_threshold(*before)
+    assert within == ((max(thresholds[0], 20_000), *thresholds[1:]) if thresholds[0] else thresholds)

@@ -18,7 +18,7 @@ from estimators.core.models.motion import constant_velocity, unicycle
 from estimators.core.models.process import MotionProcess
 from estimators.core.outliers import Outliers
 from estimators.core.particle import ParticleFilter, ParticleState, drawn
-from estimators.core.screening import Limits, Screen
+from estimators.core.screening import Limits, Screen, judge
 from estimators.core.types import Gaussian
 
 
@@ -278,3 +278,18 @@ def test_a_cautious_variance_holds_for_any_correlation(correlation, told):
 @pytest.mark.parametrize("told", [2.25, 9.0, 100.0, math.inf, math.nan])
 def test_what_is_known_no_better_does_not_count(told):
     assert fusion.cautious_variance(9.0, told) == math.inf
+
+
+def test_components_are_judged_together_as_each_is_alone():
+    """Also where one is refused, not a number, or stamped before the last one."""
+    rng = np.random.default_rng(3)
+    limits = [Limits(low=-1.0, high=1.0), Limits(), Limits(low=-2.0, high=2.0, rate=3.0, noise=0.1), Limits(high=0.5)]
+    together, alone = [Screen(one) for one in limits], [Screen(one) for one in limits]
+    seen = set()
+    for k in range(400):
+        stamp = 0.1 * (k + int(rng.integers(-2, 2))) if k % 50 else math.nan
+        values = rng.choice([0.1, -0.2, 0.3, 0.9, 1.5, math.inf, math.nan], 4, p=[0.3, 0.3, 0.1, 0.1, 0.1, 0.05, 0.05])
+        reasons = [screen.judge(stamp, value) for screen, value in zip(alone, values.tolist(), strict=True)]
+        assert judge(together, stamp, values.tolist()) == next(filter(None, reasons), "")
+        seen |= set(reasons)
+    assert seen == {"", "not_finite", "impossible", "clock", "spike"}

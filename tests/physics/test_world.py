@@ -342,3 +342,46 @@ def test_the_water_of_one_call_is_right_to_second_order():
     # Expansions of 0.4 and 0.2 s against 0.01 s, which itself is off by 1/400 of the finer one's error.
     assert coarse / fine == pytest.approx(4.0, rel=0.1)
     assert fine < 1e-3
+
+
+def test_truth_is_what_mujoco_and_scipy_say():
+    """Position, quaternion, attitude and body velocity of a vehicle that rolls, pitches and turns."""
+    world = build((0.2, -0.1, 0.05))
+    world.put((3.0, -4.0, 15.0), 1.1, 1.4, 80.0)
+    world.steer(0.2, -0.15, 90.0)
+    world.advance(250)
+    pose, velocity, truth = world.data.qpos[:7], world.data.qvel[:6], world.state()
+    ned = Rotation.from_euler("x", np.pi)
+    body = ned * Rotation.from_quat(pose[3:], scalar_first=True) * ned
+    yaw, pitch, roll = body.as_euler("ZYX")
+    assert min(abs(roll), abs(pitch), abs(yaw)) > 1e-3
+    assert truth.position == pytest.approx(ned.apply(pose[:3]), abs=1e-12)
+    assert truth.attitude == pytest.approx((roll, pitch, yaw), abs=1e-12)
+    assert truth.nu[:3] == pytest.approx(body.inv().apply(ned.apply(velocity[:3])), abs=1e-12)
+    assert truth.nu[3:] == pytest.approx(ned.apply(velocity[3:]), abs=1e-12)
+    assert Rotation.from_quat(truth.quaternion, scalar_first=True).approx_equal(body, atol=1e-12)
+
+
+def test_what_is_far_is_not_looked_at_again_before_it_can_be_near():
+    """The same states bit for bit as of a world that looks at every step; near the dock and the floor it looks, too."""
+    runs, looks = [], []
+    for patient in (True, False):
+        world = build(heading=0.0)
+        world.put((-30.0, 0.1, DEPTH), 0.0, 1.5, 90.0)
+        world.steer(0.0, 0.0, 90.0)
+        look, count = world._is_near, [0]
+
+        def counted(look=look, count=count):
+            count[0] += 1
+            return look()
+
+        world._is_near, world._looks_ahead, states = counted, patient, []
+        for _ in range(250):
+            world.advance(10)
+            states.append(np.concatenate((world.data.qpos, world.data.qvel)))
+        assert world.time == world.data.time == pytest.approx(25.0)
+        assert world.is_latched
+        runs.append(np.array(states))
+        looks.append(count[0])
+    assert (runs[0] == runs[1]).all()
+    assert looks[0] < 0.6 * looks[1]

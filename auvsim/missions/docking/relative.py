@@ -10,6 +10,8 @@ SMOOTHING = 10.0  # time constant of a current that is the difference of two vel
 MEMORY = 20.0  # time constant of the smoothed deviation of the current [s]
 RESPONSE = 5.0  # time in which the speed through the water follows a command, roughly [s]
 
+_new = tuple.__new__  # of a named tuple, in half the time
+
 
 class Relative(NamedTuple):
     """The vehicle against the dock; lengths of the nose from the centre of the mouth."""
@@ -111,10 +113,10 @@ class Locator:
             slopes = {"north": -sa, "east": ca, DOCK_HEADING_BIAS: along, COMPASS_BIAS: -self._nose}
             self._smooth(estimate)
             self._judged = estimate.time, estimate.deviation(slopes), estimate.deviation({DEPTH_BIAS: 1.0})
-        return Relative(
+        return _new(Relative, (
             heading, axis, north, east, along, cross, gauge - depth_bias - depth, velocity, current,
             self._judged[1], self._judged[2], self._unsteadiness or 0.0, compass_bias, depth_bias,
-        )  # fmt: skip
+        ))  # fmt: skip
 
     def _smooth(self, estimate: Estimate) -> None:
         if "current_north" in estimate.names:
