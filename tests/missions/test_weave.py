@@ -20,14 +20,16 @@ LEG = Leg(0.3, 0.25, (40.0, -25.0, 20.0), -190.0, -20.0, 1.1, (0.1, -0.15), 7.0)
 AHEAD = FixSource((60.0, -20.0, 33.0), 4.0, lambda d: 0.1)
 ASIDE = FixSource((-90.0, 70.0, 38.0), 7.0, lambda d: 0.25)
 USBL = FixSource((40.0, -25.0, 19.0), 12.3, lambda d: 0.02 + 0.002 * d, bearing=True)
+STATES = [0, 1, 2, 3, 8]  # of an odometer: place, current, and what the compass shows too much
 WEAVE = Weave(9.0, -190.0, -34.0)
 
 
 def prior() -> np.ndarray:
-    """A lopsided covariance of place and current."""
-    root = np.array([[1.5, 0.0, 0.0, 0.0], [0.4, 2.0, 0.0, 0.0], [0.02, -0.01, 0.04, 0.0], [0.0, 0.05, 0.01, 0.06]])
+    """A lopsided covariance of place, current and compass bias."""
+    root = np.diag([1.5, 2.0, 0.04, 0.06, 0.02])
+    root[1, 0], root[2, 0], root[2, 1], root[3, 1], root[3, 2], root[4, 1] = 0.4, 0.02, -0.01, 0.05, 0.01, 0.01
     found = np.zeros((9, 9))
-    found[:4, :4] = root @ root.T
+    found[np.ix_(STATES, STATES)] = root @ root.T
     return found
 
 
@@ -49,36 +51,41 @@ def way(leg: Leg, weave: Weave, pieces: int = 4000) -> tuple[np.ndarray, np.ndar
 
 
 def by_least_squares(leg: Leg, weave: Weave, sources: list[FixSource], covariance: np.ndarray) -> float:
-    """Deviation of the miss, of one problem in which place and current at every sight are unknown."""
+    """Deviation of the miss, of one problem in which place, current and compass bias at every sight are unknown."""
     times, places = way(leg, weave)
     stamps = [(t, s) for s in sources for t in np.arange(times[-1] - 0.5 * s.interval, 0.0, -s.interval)]
     stamps = [(0.0, None), *sorted(stamps, key=lambda pair: pair[0]), (times[-1], None)]
-    information = np.zeros((4 * len(stamps),) * 2)
-    information[:4, :4] = np.linalg.inv(covariance[:4, :4])
+    at = np.stack([np.interp([t for t, _ in stamps], times, column) for column in places.T], axis=1)
+    n = 5
+    information = np.zeros((n * len(stamps),) * 2)
+    information[:n, :n] = np.linalg.inv(covariance[np.ix_(STATES, STATES)])
     for k, (t, source) in enumerate(stamps):
         if k:
             dt = t - stamps[k - 1][0]
-            D = np.zeros((4, 4 * len(stamps)))
-            D[:, 4 * k : 4 * k + 4], D[:, 4 * k - 4 : 4 * k] = np.eye(4), -np.eye(4)
-            D[0, 4 * k - 2] = D[1, 4 * k - 1] = -dt
+            north, east = at[k] - at[k - 1] - dt * np.array(leg.current)  # through the water
+            F = np.eye(n)
+            F[0, 2] = F[1, 3] = dt
+            F[0, 4], F[1, 4] = east, -north  # turned to port by what the compass shows too much
+            D = np.zeros((n, n * len(stamps)))
+            D[:, n * k : n * k + n], D[:, n * k - n : n * k] = np.eye(n), -F
             q, p = CURRENT_WALK, DockingNoise().position
-            Q = np.kron(np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]) * q, np.eye(2)) + np.diag(
-                [p * dt] * 2 + [0, 0]
-            )
+            Q = np.eye(n) * 1e-14  # a compass bias is constant
+            Q[:4, :4] = np.kron(np.array([[dt**3 / 3, dt**2 / 2], [dt**2 / 2, dt]]) * q, np.eye(2))
+            Q[0, 0] += p * dt
+            Q[1, 1] += p * dt
             information += D.T @ np.linalg.inv(Q) @ D
         if source is not None:
-            here = np.array([np.interp(t, times, column) for column in places.T])
-            away = np.array([*here, leg.mouth[2]]) - np.array(source.place)
+            away = np.array([*at[k], leg.mouth[2]]) - np.array(source.place)
             distance, level = np.linalg.norm(away), np.linalg.norm(away[:2])
             ahead, aside = away[:2] / distance, np.array([-away[1], away[0]]) / level
             rows = [ahead, aside] if source.bearing else [ahead]
             for row in rows:
-                h = np.zeros(4 * len(stamps))
-                h[4 * k : 4 * k + 2] = row
+                h = np.zeros(n * len(stamps))
+                h[n * k : n * k + 2] = row
                 information += np.outer(h, h) / source.deviation(distance) ** 2
-    last = np.linalg.inv(information)[-4:, -4:]
+    last = np.linalg.inv(information)[-n:, -n:]
     a = np.array([-math.sin(leg.axis), math.cos(leg.axis)])
-    a = np.concatenate((a, a * leg.lookahead / leg.speed))
+    a = np.array([*a, *(a * leg.lookahead / leg.speed), 0.0])
     return math.sqrt(a @ last @ a)
 
 
@@ -113,7 +120,9 @@ def test_a_weave_swings_to_both_sides_and_ends_along_the_line():
 def least(noise: float) -> float:
     """The amplitude for two beacons ahead, of which one lies a little beside the line."""
     beacons = [AHEAD._replace(deviation=lambda d: noise, place=place) for place in (AHEAD.place, (90.0, -8.0, 30.0))]
-    return least_weave(LEG, 16.0, 1.6, lambda weave: miss_deviation(LEG, weave, beacons, prior())).amplitude
+    known = prior()
+    known[8], known[:, 8] = 0.0, 0.0  # the compass is right
+    return least_weave(LEG, 16.0, 1.6, lambda weave: miss_deviation(LEG, weave, beacons, known)).amplitude
 
 
 def test_the_least_weave_that_suffices_is_flown():
