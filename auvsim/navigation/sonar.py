@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from auvsim.acoustics.message import Delivery
@@ -27,16 +28,21 @@ from estimators.core.types import Measurement, Models
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
+from estimators.map_path.window import Window
 
-SCALE = "dvl_scale"
+SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
+ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
+SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
+WINDOW = Window(kept=14, lags=(4,), interval=4, covariance_factor=6.0)  # a DVL knows each second better
+KEYFRAMES = Keyframes(interval=4, support=2, covariance_factor=25.0)
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
 
 class SonarNavigator(ReckoningNavigator):
     """Dead reckoning with the DVL's scale as a state, and frames of a sonar matched with earlier ones.
 
-    A frame is laid on the floor by the last altitude.
+    A frame is laid on the floor at its mean depth of late, which altimeter and depth gauge tell.
 
     Raises:
         InputError: The vehicle has no imaging sonar or no altimeter, or more than one sonar.
@@ -55,10 +61,10 @@ class SonarNavigator(ReckoningNavigator):
         bearings, ranges = geometry(settings)
         polar = PolarGrid(bearings=tuple(bearings.tolist()), ranges=tuple(ranges.tolist()))
         reach = 0.95 * float(ranges[-1])
-        cell = reach / 40.0
+        cell = reach / ROWS
         half = min(math.radians(60.0), 0.98 * float(bearings[-1]))
         grid = SectorGrid(
-            cell=cell, shape=(40, 80), ranges=(max(2.0 * cell, float(ranges[0])), reach), half_sector=half
+            cell=cell, shape=(ROWS, 2 * ROWS), ranges=(max(4.0 * cell, float(ranges[0])), reach), half_sector=half
         )
         self._frames = SectorFrames(polar=polar, grid=grid)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
@@ -66,27 +72,36 @@ class SonarNavigator(ReckoningNavigator):
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)
         )
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
-        self._altitude = math.nan
+        self._altitude = self._floor = math.nan
+        self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
         dvls = of_kind(setup.sensors, DvlSettings)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
+        self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
         super().__init__(setup)
 
     def _motion(self) -> Motion:
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
         positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
-        motion = with_error(super()._motion(), SCALE, "1")
+        motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
 
         def rates(x: Symbols, u: Symbols) -> Symbols:
-            true = {name: x[name] / (1.0 + x[SCALE]) for name in ("surge", "sway")}
+            c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
+            true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
             return motion.rates({**x, **true}, u)
 
         return replace(motion, rates=rates)
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
-        keyframes = Keyframes(closures=s.closures, spacing=s.keyframes) if s.match else None
+        keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
         filter_ = KeyframeFilter(
-            self._matcher, process, models, self._start, gates=dict.fromkeys(models, 0.9999), keyframes=keyframes
+            self._matcher,
+            process,
+            models,
+            self._start,
+            gates=dict.fromkeys(models, 0.9999),
+            window=WINDOW,
+            keyframes=keyframes,
         )
         self._matches = s.match
         return Estimator(filter_, step=setup.period, keep=s.keep)
@@ -98,15 +113,17 @@ class SonarNavigator(ReckoningNavigator):
         )
 
     def _known(self) -> dict[str, float]:
-        return {**super()._known(), SCALE: max(self._scale, 1e-6)}
+        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6)}
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now; readings of each sensor since the last update are averaged."""
         images = [reading for reading in readings if reading.sensor == self._sonar]
         plain = [reading for reading in readings if reading.sensor != self._sonar]
         for reading in plain:
-            if reading.sensor in self._altimeters:
-                self._altitude = float(reading.value[0]) * math.cos(self._tilt[0]) * math.cos(self._tilt[1])
+            if reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+            elif reading.sensor in self._altimeters:
+                self._hear(reading)
         fixes = [reading for reading in plain if reading.sensor == "usbl"]
         means = [
             reading._replace(stamp=round(reading.stamp, 6))
@@ -114,6 +131,22 @@ class SonarNavigator(ReckoningNavigator):
         ]
         self._images = images if self._matches and self._altitude <= self._highest else []
         return super().update(time, [*means, *fixes], messages, commands)
+
+    def _hear(self, reading: Reading) -> None:
+        """Takes an altimeter's echo: altitude above the mean depth of the floor of late.
+
+        What the sonar looks at is ahead, and no nearer to the depth right below than to the mean; where the altitude
+        follows each bump, features seem to move.
+        """
+        depth = self._depth.at(reading.stamp)
+        if depth is None:
+            return
+        below = depth + float(reading.value[0]) * math.cos(self._tilt[0]) * math.cos(self._tilt[1])
+        passed = reading.stamp - self._heard
+        self._echoes = 1 if passed > PATIENCE else self._echoes + 1
+        share = max(1.0 / self._echoes, 1.0 - math.exp(-passed / SMOOTHING))
+        self._floor = below if self._echoes == 1 else self._floor + share * (below - self._floor)
+        self._heard, self._altitude = reading.stamp, self._floor - depth
 
     def _more(self) -> list[Measurement]:
         """The frames of the images."""

@@ -29,7 +29,7 @@ from estimators.map_path.closures import LEAST, PROBABILITY, largest_clique
 from estimators.map_path.frames import KIND
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Search, match
-from estimators.map_path.poses import between, compose
+from estimators.map_path.poses import between, compose, wrapped
 from estimators.map_path.window import Relation, Window, WindowFilter, WindowState, rearranged, with_angles
 
 PATIENCE = 3  # measurements of a kind refused in a row, after which the next is believed
@@ -43,12 +43,13 @@ class Keyframes:
     closures: bool = True  # whether loops are closed
     gap: int = 60  # frames between the two of a closure at least
     distance: float = 12.0  # between the places that the two look at, at most [m]
+    turn: float = 0.5  # between their headings, at most: from elsewhere light and shade differ, alike in all frames [rad]
     interval: int = 2  # frames from one attempt to the next
     support: int = 3  # keyframes that are matched at once at most
     ratio: float = 25.0  # least log-likelihood of a closure against no relation
     search: Search = Search(limits=(4.0, 4.0, np.radians(4.0)))  # noqa: RUF009 - immutable
     search_prior: tuple[float, float, float] = (0.1, 0.1, np.radians(0.5))  # added to that of the search, deviations
-    covariance_factor: float = 6.0  # of a closure: light and shade depend on where a slope is seen from
+    covariance_factor: float = 6.0  # of a closure: relief moves echoes, of neighbouring closures alike
 
 
 class Closure(NamedTuple):
@@ -235,7 +236,8 @@ class KeyframeFilter(WindowFilter):
         old = [k for k, number in enumerate(state.numbers) if number <= latest - settings.gap]
         if not old:
             return None
-        distances = np.hypot(*(looked_at[old] - looked_at[-1]).T)
+        turns = np.abs(wrapped(poses[old, 2] - poses[-1, 2]))
+        distances = np.where(turns <= settings.turn, np.hypot(*(looked_at[old] - looked_at[-1]).T), np.inf)
         near = [old[k] for k in np.argsort(distances)[: settings.support] if distances[k] <= settings.distance]
         if not near:
             return None
