@@ -19,6 +19,8 @@ from auvsim.navigation.reckoning import ReckoningNavigator
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.imaging_sonar import ImagingSonarSettings, geometry
 from estimators.core.estimator import Estimator
@@ -26,7 +28,7 @@ from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
 from estimators.map_path.frames import PolarGrid, SectorGrid
-from estimators.map_path.keyframes import KeyframeFilter, Keyframes, KeyframeState
+from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
 from estimators.map_path.window import Window
 
@@ -34,8 +36,9 @@ SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
 ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
 SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
-WINDOW = Window(kept=14, lags=(4,), interval=4, covariance_factor=6.0)  # a DVL knows each second better
-KEYFRAMES = Keyframes(interval=4, support=2, covariance_factor=25.0)
+WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
+KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
+SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
 
@@ -72,8 +75,7 @@ class SonarNavigator(ReckoningNavigator):
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)
         )
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
-        self._altitude = self._floor = math.nan
-        self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
+        self._positions = {*of_kind(setup.sensors, GpsSettings), *of_kind(setup.sensors, FixSettings)}
         dvls = of_kind(setup.sensors, DvlSettings)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
@@ -103,7 +105,7 @@ class SonarNavigator(ReckoningNavigator):
             window=WINDOW,
             keyframes=keyframes,
         )
-        self._matches = s.match
+        self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
 
     def _gyro_walk(self, setup: NavigatorSetup) -> float:
@@ -114,6 +116,15 @@ class SonarNavigator(ReckoningNavigator):
 
     def _known(self) -> dict[str, float]:
         return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6)}
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        super().reset()
+        self._altitude = self._floor = math.nan
+        self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
+        self._fixed: float | None = None  # when there was a fix last [s]
+        self._seen = 0  # frames near the floor
+        self._dived = False  # whether the begin of the dive was marked
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now; readings of each sensor since the last update are averaged."""
@@ -129,8 +140,18 @@ class SonarNavigator(ReckoningNavigator):
             reading._replace(stamp=round(reading.stamp, 6))
             for reading, _ in averaged([r for r in plain if r not in fixes])
         ]
-        self._images = images if self._matches and self._altitude <= self._highest else []
+        if any(reading.sensor in self._positions for reading in plain):
+            self._fixed = time
+        self._marks = self._dive_mark(time)
+        self._images = [image for image in images if self._is_used()]
         return super().update(time, [*means, *fixes], messages, commands)
+
+    def _is_used(self) -> bool:
+        """Whether a frame that came is matched: each `stride`-th of those taken near the floor."""
+        if not self._matches or not self._altitude <= self._highest:
+            return False
+        self._seen += 1
+        return (self._seen - 1) % self._stride == 0
 
     def _hear(self, reading: Reading) -> None:
         """Takes an altimeter's echo: altitude above the mean depth of the floor of late.
@@ -149,13 +170,21 @@ class SonarNavigator(ReckoningNavigator):
         self._heard, self._altitude = reading.stamp, self._floor - depth
 
     def _more(self) -> list[Measurement]:
-        """The frames of the images."""
-        return [
+        """The frames of the images, and a mark where the dive begins."""
+        frames = [
             self._frames.frame(
                 reading.image, altitude=self._altitude, stamp=reading.stamp, sequence=reading.sequence
             ).measurement()
             for reading in self._images
         ]
+        return [*frames, *self._marks]
+
+    def _dive_mark(self, time: float) -> list[Measurement]:
+        """Has the pose kept where the first fixes end."""
+        if self._dived or not self._matches or self._fixed is None or time - self._fixed <= SUBMERGED:
+            return []
+        self._dived = True
+        return [Measurement(kind=MARK, value=np.zeros(1), covariance=np.eye(1), stamp=time, received=time)]
 
     @property
     def path(self) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -163,9 +192,16 @@ class SonarNavigator(ReckoningNavigator):
         state = self._estimator.history.state
         if not isinstance(state, KeyframeState):
             return np.empty(0), np.empty((0, 3)), []
-        poses = state.poses.copy()
+        first = 0 if state.mark is None else 1
+        poses = state.poses[first:].copy()
         poses[:, 2] = [wrap(heading) for heading in poses[:, 2]]
-        return np.array(state.stamps), poses, [frame.values for frame in state.frames]
+        return np.array(state.stamps[first:]), poses, [frame.values for frame in state.frames[first:]]
+
+    @property
+    def dive(self) -> tuple[float, np.ndarray] | None:
+        """When the first dive began [s], after the last fix at the surface, and the pose (3,) there, given all so far."""
+        state = self._estimator.history.state
+        return state.mark if isinstance(state, KeyframeState) else None
 
     @property
     def closed(self) -> int:

@@ -16,7 +16,7 @@ from estimators.core.history import Input, Node
 from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Models, ProcessModel, Verdicts, wrapped
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
-from estimators.map_path.matching import Search, match
+from estimators.map_path.matching import NO_OVERLAP, Search, match
 from estimators.map_path.odometry import OdometryNoise
 from estimators.map_path.poses import between, between_jacobians
 
@@ -114,6 +114,8 @@ class WindowFilter:
     def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float]:
         """State with a frame matched against the window, or why it was not, and the match's NIS."""
         chosen = [len(state.frames) - lag for lag in self._window.lags if lag <= len(state.frames)]
+        if not chosen:
+            return state, NO_OVERLAP, np.nan
         earlier = [state.frames[k] for k in chosen]
         relation = Relation.of_pose(state.whole, state.size, [state.size + 3 * k for k in chosen])
         prior = relation.covariance(0) + 1e-8 * np.eye(3)
