@@ -2,7 +2,7 @@
 
 The shipped scenario `survey`, steered by its own estimator, with closures. Dead reckoning and the sonar without them
 are given the same readings beside it. No frame shows where the dive began or a turn of the whole path, so each is also
-judged from the dive point on, as it is believed at the time (where the last fix was used: a scale learnt later moves it too),
+judged from the dive point on, as it is believed at the time (what is learnt later of the DVL moves it too),
 after the rotation about it that brings the path closest to the true one.
 """
 

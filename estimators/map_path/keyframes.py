@@ -45,7 +45,9 @@ class Keyframes:
     closures: bool = True  # whether loops are closed
     gap: int = 60  # frames between the two of a closure at least
     distance: float = 12.0  # between the places that the two look at, at most [m]
-    turn: float = 0.5  # between their headings, at most: from elsewhere light and shade differ, alike in all frames [rad]
+    turn: float = (
+        0.5  # between their headings, at most: from elsewhere light and shade differ, alike in all frames [rad]
+    )
     interval: int = 2  # frames from one attempt to the next
     support: int = 3  # keyframes that are matched at once at most
     ratio: float = 25.0  # least log-likelihood of a closure against no relation
