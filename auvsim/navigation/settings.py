@@ -107,7 +107,12 @@ class SonarSettings(ReckoningSettings):
     kind: Literal["sonar"] = "sonar"  # pyright: ignore[reportIncompatibleVariableOverride]
     match: bool = Field(default=True, description="whether frames are matched; without, it is dead reckoning")
     closures: bool = Field(default=True, description="whether loops are closed between lanes")
-    keyframes: int = Field(default=6, ge=1, le=1000, description="frames from one that is kept for that to the next")
+    stride: int = Field(
+        default=4, ge=1, le=1000, description="frames from one that is matched to the next; a DVL knows the rest better"
+    )
+    keyframes: int = Field(
+        default=2, ge=1, le=1000, description="matched frames from one that is kept for closures to the next"
+    )
     keep: float = Field(default=10.0, gt=0, description="age up to which measurements are used [s]")
 
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
+import casadi as ca
 import numpy as np
 
 from auvsim.acoustics.message import Delivery
@@ -18,6 +19,8 @@ from auvsim.navigation.reckoning import ReckoningNavigator
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.fix import FixSettings
+from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.imaging_sonar import ImagingSonarSettings, geometry
 from estimators.core.estimator import Estimator
@@ -25,18 +28,24 @@ from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
 from estimators.map_path.frames import PolarGrid, SectorGrid
-from estimators.map_path.keyframes import KeyframeFilter, Keyframes, KeyframeState
+from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
+from estimators.map_path.window import Window
 
-SCALE = "dvl_scale"
+SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
+ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
+SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
+WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
+KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
+SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
 
 class SonarNavigator(ReckoningNavigator):
     """Dead reckoning with the DVL's scale as a state, and frames of a sonar matched with earlier ones.
 
-    A frame is laid on the floor by the last altitude.
+    A frame is laid on the floor at its mean depth of late, which altimeter and depth gauge tell.
 
     Raises:
         InputError: The vehicle has no imaging sonar or no altimeter, or more than one sonar.
@@ -55,10 +64,10 @@ class SonarNavigator(ReckoningNavigator):
         bearings, ranges = geometry(settings)
         polar = PolarGrid(bearings=tuple(bearings.tolist()), ranges=tuple(ranges.tolist()))
         reach = 0.95 * float(ranges[-1])
-        cell = reach / 40.0
+        cell = reach / ROWS
         half = min(math.radians(60.0), 0.98 * float(bearings[-1]))
         grid = SectorGrid(
-            cell=cell, shape=(40, 80), ranges=(max(2.0 * cell, float(ranges[0])), reach), half_sector=half
+            cell=cell, shape=(ROWS, 2 * ROWS), ranges=(max(4.0 * cell, float(ranges[0])), reach), half_sector=half
         )
         self._frames = SectorFrames(polar=polar, grid=grid)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
@@ -66,29 +75,37 @@ class SonarNavigator(ReckoningNavigator):
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)
         )
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
-        self._altitude = math.nan
+        self._positions = {*of_kind(setup.sensors, GpsSettings), *of_kind(setup.sensors, FixSettings)}
         dvls = of_kind(setup.sensors, DvlSettings)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
+        self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
         super().__init__(setup)
 
     def _motion(self) -> Motion:
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
         positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
-        motion = with_error(super()._motion(), SCALE, "1")
+        motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
 
         def rates(x: Symbols, u: Symbols) -> Symbols:
-            true = {name: x[name] / (1.0 + x[SCALE]) for name in ("surge", "sway")}
+            c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
+            true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
             return motion.rates({**x, **true}, u)
 
         return replace(motion, rates=rates)
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
-        keyframes = Keyframes(closures=s.closures, spacing=s.keyframes) if s.match else None
+        keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
         filter_ = KeyframeFilter(
-            self._matcher, process, models, self._start, gates=dict.fromkeys(models, 0.9999), keyframes=keyframes
+            self._matcher,
+            process,
+            models,
+            self._start,
+            gates=dict.fromkeys(models, 0.9999),
+            window=WINDOW,
+            keyframes=keyframes,
         )
-        self._matches = s.match
+        self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
 
     def _gyro_walk(self, setup: NavigatorSetup) -> float:
@@ -98,31 +115,76 @@ class SonarNavigator(ReckoningNavigator):
         )
 
     def _known(self) -> dict[str, float]:
-        return {**super()._known(), SCALE: max(self._scale, 1e-6)}
+        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6)}
+
+    def reset(self) -> None:
+        """Forgets everything."""
+        super().reset()
+        self._altitude = self._floor = math.nan
+        self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
+        self._fixed: float | None = None  # when there was a fix last [s]
+        self._seen = 0  # frames near the floor
+        self._dived = False  # whether the begin of the dive was marked
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now; readings of each sensor since the last update are averaged."""
         images = [reading for reading in readings if reading.sensor == self._sonar]
         plain = [reading for reading in readings if reading.sensor != self._sonar]
         for reading in plain:
-            if reading.sensor in self._altimeters:
-                self._altitude = float(reading.value[0]) * math.cos(self._tilt[0]) * math.cos(self._tilt[1])
+            if reading.sensor == "depth":
+                self._depth.update(reading.stamp, float(reading.value[0]))
+            elif reading.sensor in self._altimeters:
+                self._hear(reading)
         fixes = [reading for reading in plain if reading.sensor == "usbl"]
         means = [
             reading._replace(stamp=round(reading.stamp, 6))
             for reading, _ in averaged([r for r in plain if r not in fixes])
         ]
-        self._images = images if self._matches and self._altitude <= self._highest else []
+        if any(reading.sensor in self._positions for reading in plain):
+            self._fixed = time
+        self._marks = self._dive_mark(time)
+        self._images = [image for image in images if self._is_used()]
         return super().update(time, [*means, *fixes], messages, commands)
 
+    def _is_used(self) -> bool:
+        """Whether a frame that came is matched: each `stride`-th of those taken near the floor."""
+        if not self._matches or not self._altitude <= self._highest:
+            return False
+        self._seen += 1
+        return (self._seen - 1) % self._stride == 0
+
+    def _hear(self, reading: Reading) -> None:
+        """Takes an altimeter's echo: altitude above the mean depth of the floor of late.
+
+        What the sonar looks at is ahead, and no nearer to the depth right below than to the mean; where the altitude
+        follows each bump, features seem to move.
+        """
+        depth = self._depth.at(reading.stamp)
+        if depth is None:
+            return
+        below = depth + float(reading.value[0]) * math.cos(self._tilt[0]) * math.cos(self._tilt[1])
+        passed = reading.stamp - self._heard
+        self._echoes = 1 if passed > PATIENCE else self._echoes + 1
+        share = max(1.0 / self._echoes, 1.0 - math.exp(-passed / SMOOTHING))
+        self._floor = below if self._echoes == 1 else self._floor + share * (below - self._floor)
+        self._heard, self._altitude = reading.stamp, self._floor - depth
+
     def _more(self) -> list[Measurement]:
-        """The frames of the images."""
-        return [
+        """The frames of the images, and a mark where the dive begins."""
+        frames = [
             self._frames.frame(
                 reading.image, altitude=self._altitude, stamp=reading.stamp, sequence=reading.sequence
             ).measurement()
             for reading in self._images
         ]
+        return [*frames, *self._marks]
+
+    def _dive_mark(self, time: float) -> list[Measurement]:
+        """Has the pose kept where the first fixes end."""
+        if self._dived or not self._matches or self._fixed is None or time - self._fixed <= SUBMERGED:
+            return []
+        self._dived = True
+        return [Measurement(kind=MARK, value=np.zeros(1), covariance=np.eye(1), stamp=time, received=time)]
 
     @property
     def path(self) -> tuple[np.ndarray, np.ndarray, list[np.ndarray]]:
@@ -130,9 +192,16 @@ class SonarNavigator(ReckoningNavigator):
         state = self._estimator.history.state
         if not isinstance(state, KeyframeState):
             return np.empty(0), np.empty((0, 3)), []
-        poses = state.poses.copy()
+        first = 0 if state.mark is None else 1
+        poses = state.poses[first:].copy()
         poses[:, 2] = [wrap(heading) for heading in poses[:, 2]]
-        return np.array(state.stamps), poses, [frame.values for frame in state.frames]
+        return np.array(state.stamps[first:]), poses, [frame.values for frame in state.frames[first:]]
+
+    @property
+    def dive(self) -> tuple[float, np.ndarray] | None:
+        """When the first dive began [s], after the last fix at the surface, and the pose (3,) there, given all so far."""
+        state = self._estimator.history.state
+        return state.mark if isinstance(state, KeyframeState) else None
 
     @property
     def closed(self) -> int:

@@ -1,10 +1,11 @@
 """From an imaging sonar's intensities to frames that the estimators of `map_path` compare: on the level, standardised.
 
 A sonar measures slant ranges, and echoes that fall with range and have speckle. The estimators take a frame for a map
-of a level floor in white noise of one size. So each beam is laid on the floor by the altitude, each range is divided by
-its mean over the beams, and intensities are averaged over cells, which takes out most of the speckle. Of their
-logarithm the mean of the surroundings is removed, since broad light and shade partly go with the vehicle and would pull
-matches to no motion; then each ring of ranges is given mean 0 and variance 1.
+of a level floor in white noise of one size. So each beam is laid on the floor by the altitude, and intensities are
+averaged over cells, which takes out most of the speckle. Of their logarithm the mean of the surroundings is removed,
+since broad light and shade partly go with the vehicle and would pull matches to no motion; then it is given mean 0 and
+a variance of 1 that does not fall with range. Nothing is made even range by range: a bright rock would darken the arc
+of its range, and arcs come nearer by less than the vehicle moves.
 """
 
 import math
@@ -18,9 +19,10 @@ from auvsim.base.frames import Array
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame, to_sector
 
 SURROUNDINGS = 1.0  # standard deviation of the Gaussian over which their mean is taken [m]
-RING = 1.0  # width of the rings that are standardised [m]
-BLANK = 1e-9  # spread of a ring below which it shows nothing
-LEAST = 1e-3  # intensity by the mean of its range below which the logarithm is cut
+LEAST_HEARD = 100  # cells within the sonar's ranges, fewer and a frame shows nothing
+BLANK = 1e-9  # spread of a frame below which it shows nothing
+LEAST = 1e-9  # intensity by the mean of its frame below which the logarithm is cut
+FAINT = 1e-4  # square of a value by their mean below which its logarithm says nothing of the spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +42,9 @@ class SectorFrames:
             sequence: counts the frames.
         """
         level = self._on_the_floor(np.asarray(intensity, dtype=float), altitude)
-        level /= np.maximum(level.mean(axis=0), 1e-300)
         cells = to_sector(level, self._floor, self.grid)[self.grid.seen]
         image = np.zeros(self.grid.shape)
-        image[self.grid.seen] = np.log(np.maximum(cells, LEAST))
+        image[self.grid.seen] = np.log(np.maximum(cells, max(LEAST * cells.mean(), 1e-300)))
         image[self.grid.seen] = self._standardised(self._detailed(image)[self.grid.seen], altitude)
         return SonarFrame(stamp=stamp, intensity=image, geometry=self.grid, sequence=sequence)
 
@@ -63,14 +64,24 @@ class SectorFrames:
         return image - gaussian_filter(image, width) / shares
 
     def _standardised(self, values: Array, altitude: float) -> Array:
-        """Values of the cells that are seen, each ring's of mean 0 and variance 1; 0 beyond the sonar's ranges."""
-        ring, slant = self._rings, np.hypot(self._distances, altitude)
-        counts = np.maximum(np.bincount(ring), 1)
-        values = values - (np.bincount(ring, values) / counts)[ring]
-        spread = np.sqrt(np.bincount(ring, values**2) / counts)[ring]
+        """Values of the cells that are seen, of mean 0 and of variance 1 at all ranges; 0 beyond the sonar's ranges.
+
+        The logarithm of the variance is taken for a parabola over range.
+        """
+        slant = np.hypot(self._distances, altitude)
         heard = (slant >= self.polar.ranges[0]) & (slant <= self.polar.ranges[-1])
-        blank = spread < BLANK  # not where it is not finite: that is to be seen
-        return np.where(heard & ~blank, values / np.where(blank, 1.0, spread), 0.0)
+        result, own = np.zeros(values.shape), values[heard]
+        if not np.isfinite(own).all():
+            result[heard] = np.nan
+            return result
+        if own.size < LEAST_HEARD or own.std() < BLANK:
+            return result
+        own = own - own.mean()
+        basis = np.vander(self._distances[heard] / self.grid.ranges[1], 3)
+        logarithms = np.log(own**2 + FAINT * np.mean(own**2))
+        own = own * np.exp(-0.5 * (basis @ np.linalg.solve(basis.T @ basis, basis.T @ logarithms)))
+        result[heard] = (own - own.mean()) / own.std()
+        return result
 
     @cached_property
     def _floor(self) -> PolarGrid:
@@ -83,7 +94,3 @@ class SectorFrames:
     @cached_property
     def _distances(self) -> Array:
         return np.hypot(*self.grid.centres[self.grid.seen].T)
-
-    @cached_property
-    def _rings(self) -> np.ndarray:
-        return (self._distances / RING).astype(int)

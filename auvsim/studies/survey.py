@@ -2,7 +2,8 @@
 
 The shipped scenario `survey`, steered by its own estimator, with closures. Dead reckoning and the sonar without them
 are given the same readings beside it. No frame shows where the dive began or a turn of the whole path, so each is also
-judged from the dive point on, after the rotation about it that brings the path closest to the true one.
+judged from the dive point on, as it is believed at the time (what is learnt later of the DVL moves it too),
+after the rotation about it that brings the path closest to the true one.
 """
 
 import math
@@ -15,9 +16,10 @@ import numpy as np
 from rich.console import RenderableType
 from rich.table import Table
 
+from auvsim.base.errors import AuvsimError
 from auvsim.base.frames import Array
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.missions.survey.mission import DIVE, LANES
+from auvsim.missions.survey.mission import LANES
 from auvsim.navigation import registry
 from auvsim.navigation.estimate import Estimate
 from auvsim.simulation.loading import load_scenario
@@ -55,6 +57,14 @@ class Trial(NamedTuple):
     floor: float  # the compass' constant error times the distance from the dive point, rms [m]
     closures: int  # believed on the lanes
     docked: bool
+
+
+class Shown(NamedTuple):
+    """What an estimator believes at a time."""
+
+    place: Array  # (2,)
+    covariance: Array  # (2, 2)
+    dive: Array | None  # (2,) where the dive began; None if it does not keep that
 
 
 class Beside:
@@ -97,41 +107,52 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
     sonar: Any = agent.navigator
     agent.navigator = beside = Beside(sonar, others)
     (bias,) = (s.heading_bias for s, _, _ in agent.sensors if hasattr(s, "heading_bias"))
-    times, truths, kept, closures = [], [], None, 0
-    dive: dict[str, Array] = {}  # where it began, by estimator; "" the true place
-    shown: dict[str, list[tuple[Array, Array]]] = {name: [] for name in (CLOSED, *BESIDE)}
+    true: list[tuple[float, int, Array]] = []  # time, phase, place
+    shown: dict[str, list[Shown]] = {name: [] for name in (CLOSED, *BESIDE)}
+    kept, closures, stamp, pose = None, 0, math.nan, np.full(3, math.nan)
     last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
     while simulation.ticks < last and not simulation.over:
         before = agent.estimate
         simulation.step()
         phase = agent.mission.phase
-        if phase == DIVE and not dive:
-            dive = {name: e.position[:2].copy() for name, e in beside.latest.items()}
-            dive[""] = simulation.truths[agent.name].position[:2].copy()
-        if phase == LANES and agent.estimate is not before:
-            times.append(simulation.time)
-            truths.append(simulation.truths[agent.name].position[:2].copy())
+        if agent.estimate is not before and agent.estimate.initialised and phase <= LANES:
+            true.append((simulation.time, phase, simulation.truths[agent.name].position[:2].copy()))
             for name, e in beside.latest.items():
-                shown[name].append((e.position[:2].copy(), e.horizontal_covariance.copy()))
+                navigator: Any = sonar if name == CLOSED else others[name]
+                dive = None if navigator.dive is None else navigator.dive[1][:2].copy()
+                shown[name].append(Shown(e.position[:2].copy(), e.horizontal_covariance.copy(), dive))
         elif phase > LANES and kept is None:
-            kept, closures = sonar.path, sonar.closed  # before any fix by the dock
-    true, at = np.array(truths), dive[""]
+            kept, closures, (stamp, pose) = sonar.path, sonar.closed, sonar.dive  # before any fix by the dock
+    if sonar.dive is None or not any(phase == LANES for _, phase, _ in true):
+        raise AuvsimError(f"survey, seed {seed}, trial {trial}: ended before the lanes, at {simulation.time:g} s")
+    if kept is None:
+        kept, closures, (stamp, pose) = sonar.path, sonar.closed, sonar.dive
+    times, places = np.array([t for t, _, _ in true]), np.array([place for _, _, place in true])
+    dived, on_lanes = int(np.argmin(np.abs(times - stamp))), np.array([phase == LANES for _, phase, _ in true])
+    at = places[dived]
     errors = {
-        name: judged(np.array([p for p, _ in rows]), np.array([P for _, P in rows]), true, dive[name], at)
+        name: judged(
+            np.array([own.place for own, on in zip(rows, on_lanes, strict=True) if on]),
+            np.array([own.covariance for own, on in zip(rows, on_lanes, strict=True) if on]),
+            places[on_lanes],
+            np.array([rows[dived].place if own.dive is None else own.dive
+                      for own, on in zip(rows, on_lanes, strict=True) if on]),
+            at,
+        )
         for name, rows in shown.items()
-    }
-    if kept is not None:
-        on_lanes = (kept[0] >= times[0]) & (kept[0] <= times[-1])
-        there = np.column_stack([np.interp(kept[0][on_lanes], times, true[:, k]) for k in range(2)])
-        errors[WHOLE] = judged(kept[1][on_lanes, :2], None, there, dive[CLOSED], at)
-    floor = abs(float(bias)) * rms(true - at)
+    }  # fmt: skip
+    lanes = times[on_lanes]
+    there = (kept[0] >= lanes[0]) & (kept[0] <= lanes[-1])
+    truth = np.column_stack([np.interp(kept[0][there], times, places[:, k]) for k in range(2)])
+    errors[WHOLE] = judged(kept[1][there, :2], None, truth, pose[:2], at)
+    floor = abs(float(bias)) * rms(places[on_lanes] - at)
     return Trial(errors, floor, closures, agent.mission.at_rest)
 
 
 def judged(path: Array, covariances: Array | None, true: Array, believed: Array, at: Array) -> Errors:
     """Errors of a path (n, 2) with covariances (n, 2, 2), whose NEES is NaN without, against the true one (n, 2).
 
-    The dive began where the estimator believed (2,), in truth `at` (2,).
+    The dive began where the estimator believed, (2,) or as it came to believe in time (n, 2), in truth `at` (2,).
     """
     off = path - true
     nees = math.nan

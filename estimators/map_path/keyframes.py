@@ -29,9 +29,11 @@ from estimators.map_path.closures import LEAST, PROBABILITY, largest_clique
 from estimators.map_path.frames import KIND
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import Search, match
-from estimators.map_path.poses import between, compose
+from estimators.map_path.poses import between, compose, wrapped
 from estimators.map_path.window import Relation, Window, WindowFilter, WindowState, rearranged, with_angles
 
+MARK = "mark"  # kind of a measurement whose value says nothing: the pose at its time stays in the state, the first time
+MARKED = -1  # number of the blank frame that stands for it
 PATIENCE = 3  # measurements of a kind refused in a row, after which the next is believed
 
 
@@ -43,12 +45,15 @@ class Keyframes:
     closures: bool = True  # whether loops are closed
     gap: int = 60  # frames between the two of a closure at least
     distance: float = 12.0  # between the places that the two look at, at most [m]
+    turn: float = (
+        0.5  # between their headings, at most: from elsewhere light and shade differ, alike in all frames [rad]
+    )
     interval: int = 2  # frames from one attempt to the next
     support: int = 3  # keyframes that are matched at once at most
     ratio: float = 25.0  # least log-likelihood of a closure against no relation
     search: Search = Search(limits=(4.0, 4.0, np.radians(4.0)))  # noqa: RUF009 - immutable
     search_prior: tuple[float, float, float] = (0.1, 0.1, np.radians(0.5))  # added to that of the search, deviations
-    covariance_factor: float = 6.0  # of a closure: light and shade depend on where a slope is seen from
+    covariance_factor: float = 6.0  # of a closure: relief moves echoes, of neighbouring closures alike
 
 
 class Closure(NamedTuple):
@@ -82,6 +87,11 @@ class KeyframeState(NamedTuple):
     def poses(self) -> Array:
         """Poses (k, 3) of the frames that are kept, given all so far."""
         return self.whole.mean[self.size :].reshape(-1, 3)
+
+    @property
+    def mark(self) -> tuple[float, Array] | None:
+        """When the pose was marked [s], and that pose (3,) given all so far; None without a mark."""
+        return (self.stamps[0], self.poses[0]) if self.numbers[:1] == (MARKED,) else None
 
     def place(self, number: int) -> int:
         """Where a frame's pose begins in the whole state."""
@@ -141,6 +151,9 @@ class KeyframeFilter(WindowFilter):
         for measurement in measurements:
             if measurement.kind == KIND:
                 continue
+            if measurement.kind == MARK:
+                state = self._marked(state, measurement)
+                continue
             model = model_of(self.sensors, measurement)
             if model is None:
                 state = state._replace(verdicts=(*state.verdicts, (measurement, NO_MODEL, np.nan)))
@@ -186,6 +199,20 @@ class KeyframeFilter(WindowFilter):
             verdicts=(*state.verdicts, (measurement, reason, innovation.nis)),
         )
 
+    def _marked(self, state: KeyframeState, measurement: Measurement) -> KeyframeState:
+        """State with the vehicle's pose kept before those of all frames."""
+        state = state._replace(verdicts=(*state.verdicts, (measurement, "", np.nan)))
+        if state.mark is not None:
+            return state
+        n, blank = state.size, self.matcher.prepare(np.zeros(self.matcher.grid.shape))
+        rows = np.concatenate((np.arange(n), np.arange(3), np.arange(n, state.whole.mean.size)))
+        return state._replace(
+            whole=rearranged(state.whole, rows),
+            frames=(blank, *state.frames),
+            numbers=(MARKED, *state.numbers),
+            stamps=(measurement.stamp, *state.stamps),
+        )
+
     def _with(self, state: KeyframeState, frame: Prepared) -> KeyframeState:  # pyright: ignore
         """State with a frame at the vehicle's pose; the one that leaves the window goes, unless it is a keyframe."""
         n, number = state.size, state.count
@@ -193,7 +220,7 @@ class KeyframeFilter(WindowFilter):
         stamps = (*state.stamps, np.nan)
         rows = np.concatenate((np.arange(state.whole.mean.size), np.arange(3)))
         leaves, spacing = number - self._window.kept, self._keyframes.spacing
-        if leaves in numbers and not (spacing and leaves % spacing == 0):
+        if leaves >= 0 and leaves in numbers and not (spacing and leaves % spacing == 0):
             k = numbers.index(leaves)
             frames, numbers, stamps = frames[:k] + frames[k + 1 :], numbers[:k] + numbers[k + 1 :], (
                 stamps[:k] + stamps[k + 1 :]
@@ -232,10 +259,11 @@ class KeyframeFilter(WindowFilter):
         settings, latest, poses = self._keyframes, state.count - 1, state.poses
         ahead = 0.5 * sum(self.matcher.grid.ranges)
         looked_at = poses[:, :2] + ahead * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
-        old = [k for k, number in enumerate(state.numbers) if number <= latest - settings.gap]
+        old = [k for k, number in enumerate(state.numbers) if MARKED < number <= latest - settings.gap]
         if not old:
             return None
-        distances = np.hypot(*(looked_at[old] - looked_at[-1]).T)
+        turns = np.abs(wrapped(poses[old, 2] - poses[-1, 2]))
+        distances = np.where(turns <= settings.turn, np.hypot(*(looked_at[old] - looked_at[-1]).T), np.inf)
         near = [old[k] for k in np.argsort(distances)[: settings.support] if distances[k] <= settings.distance]
         if not near:
             return None

@@ -16,7 +16,7 @@ from estimators.core.history import Input, Node
 from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Models, ProcessModel, Verdicts, wrapped
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
-from estimators.map_path.matching import Search, match
+from estimators.map_path.matching import NO_OVERLAP, Search, match
 from estimators.map_path.odometry import OdometryNoise
 from estimators.map_path.poses import between, between_jacobians
 
@@ -30,6 +30,8 @@ class Window:
 
     kept: int = 12  # the last ones
     lags: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 10, 12)  # of these, counted from the latest
+    interval: int = 1  # frames from one that is matched to the next
+    covariance_factor: float = 1.0  # of a match, for what the frames' model leaves out: relief, errors that last
 
 
 class WindowState(NamedTuple):
@@ -39,6 +41,7 @@ class WindowState(NamedTuple):
     frames: tuple[Prepared, ...] = ()  # of the window
     outliers: int = 0
     verdicts: Verdicts = ()
+    count: int = 0  # frames so far
 
     @property
     def size(self) -> int:
@@ -98,7 +101,7 @@ class WindowFilter:
             reason, nis = fault(measurement.value, self.matcher.grid.seen.size, self._saturation), np.nan
             if not reason:
                 frame = self.matcher.prepare(measurement.value)
-                if state.frames:
+                if state.frames and state.count % self._window.interval == 0:
                     state, reason, nis = self._placed(state, frame)
                 state = self._with(state, frame)
             state = state._replace(verdicts=(*state.verdicts, (measurement, reason, nis)))
@@ -111,6 +114,8 @@ class WindowFilter:
     def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float]:
         """State with a frame matched against the window, or why it was not, and the match's NIS."""
         chosen = [len(state.frames) - lag for lag in self._window.lags if lag <= len(state.frames)]
+        if not chosen:
+            return state, NO_OVERLAP, np.nan
         earlier = [state.frames[k] for k in chosen]
         relation = Relation.of_pose(state.whole, state.size, [state.size + 3 * k for k in chosen])
         prior = relation.covariance(0) + 1e-8 * np.eye(3)
@@ -119,7 +124,8 @@ class WindowFilter:
             return state, found, np.nan
         H = relation.jacobian(found.weights)
         limit = chi_square(NIS_GATE, 3)
-        whole, innovation = ekf.correct_linear(state.whole, H, found.offset, found.covariance, limit)
+        R = self._window.covariance_factor * found.covariance
+        whole, innovation = ekf.correct_linear(state.whole, H, found.offset, R, limit)
         if not innovation.accepted:
             return state._replace(outliers=state.outliers + 1), OUTLIER, innovation.nis
         return state._replace(whole=with_angles(whole, state.size)), "", innovation.nis
@@ -130,7 +136,7 @@ class WindowFilter:
         rows = np.concatenate((np.arange(state.whole.mean.size), np.arange(3)))
         if len(frames) > self._window.kept:
             frames, rows = frames[1:], np.concatenate((rows[:n], rows[n + 3 :]))
-        return state._replace(whole=rearranged(state.whole, rows), frames=frames)
+        return state._replace(whole=rearranged(state.whole, rows), frames=frames, count=state.count + 1)
 
 
 class Relation(NamedTuple):
