@@ -32,7 +32,7 @@ def summarise(log: VehicleLog) -> dict[str, Any]:
         phase: dataclasses.asdict(quality) for phase, quality in estimate_quality(errors, log.phases).items()
     }
     if heard := heard_vehicles(log):
-        values["relative_rms"] = {name: _root_mean_square(relative_to(log, name).error) for name in heard}
+        values["relative_to"] = {name: _root_mean_square(relative_to(log, name).error) for name in heard}
     if "usbl" in log:
         usbl = log["usbl"]
         values |= {

@@ -77,9 +77,9 @@ def test_a_relative_error_is_the_difference_of_both(log):
         at = [np.interp(time, estimate["time"], estimate["position"][:, k]) for k in range(2)]
         off.append(np.array(at) - [np.interp(time, truth["time"], truth["position"][:, k]) for k in range(2)])
     assert found.error[-5] == pytest.approx(off[0] - off[1], abs=1e-6)
-    rms = summarise(follower)["relative_rms"]
+    rms = summarise(follower)["relative_to"]
     assert rms == {"leader": pytest.approx(math.sqrt(np.mean(np.sum(found.error**2, axis=1))))}
-    assert "relative_rms" not in summarise(leader)
+    assert "relative_to" not in summarise(leader)
 
 
 def test_the_picture_of_packets_has_a_line_for_each(log, tmp_path):
