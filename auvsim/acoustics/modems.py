@@ -9,12 +9,12 @@ from numpy.random import Generator
 from pydantic import Field
 
 from auvsim.acoustics.access import AccessSettings, FreeSettings, PollingSettings, Slots, TdmaSettings
-from auvsim.acoustics.channel import DELIVERED, ChannelSettings, Decided, SharedChannel
+from auvsim.acoustics.channel import DELIVERED, ChannelSettings, Decided, Motion, SharedChannel
 from auvsim.acoustics.clock import Clock, ClockSettings
 from auvsim.acoustics.medium import SLOWEST, Medium
 from auvsim.acoustics.message import Delivery, Fate, Message, Outgoing
 from auvsim.acoustics.modem import ModemSettings, TellSettings
-from auvsim.acoustics.motion import Segment
+from auvsim.acoustics.motion import Segment, Still
 from auvsim.acoustics.payload import NUMBERS, REQUEST, STATE, StateReport, packet_bits
 from auvsim.acoustics.station import Station
 from auvsim.base.errors import InputError
@@ -54,22 +54,30 @@ class SoundSettings(ChannelSettings):
 
 
 class Equipment(NamedTuple):
-    """A vehicle's modem and clock."""
+    """A modem and its clock, of a vehicle or at a place."""
 
     modem: ModemSettings
     clock: ClockSettings
+    place: tuple[tuple[float, float, float], float] | None = None  # where it stays: NED [m], heading [rad]
+    key: str = ""  # dotted, of its settings; "": of a vehicle's
 
 
 class Modems:
     """The modems of a run.
 
     Args:
-        stations: by name of vehicle.
+        stations: by name of vehicle, or of what stays where it is.
         channel: what carries their packets.
+        places: of those that stay: position (3,) NED [m] and heading [rad].
     """
 
-    def __init__(self, stations: Mapping[str, Station], channel: SharedChannel) -> None:
-        self.stations, self._channel = dict(stations), channel
+    def __init__(
+        self,
+        stations: Mapping[str, Station],
+        channel: SharedChannel,
+        places: Mapping[str, tuple[tuple[float, float, float], float]] | None = None,
+    ) -> None:
+        self.stations, self._channel, self._places = dict(stations), channel, dict(places or {})
         self._queues: dict[str, list[tuple[float, int, Delivery]]] = {name: [] for name in stations}
         self._stamped: dict[int, Message] = {}  # messages under way as they were stamped, by the true one's identity
         self._count = 0
@@ -85,16 +93,15 @@ class Modems:
 
     def advance(self, previous: Mapping[str, Truth], now: Mapping[str, Truth]) -> list[Fate]:
         """Lets all send and receive between two truths; returns the fates decided, with true times."""
-        sent, end = [], 0.0
-        for name, station in self.stations.items():
-            end = now[name].time
-            sent += station.begins(previous[name].time, end)
+        sent, begin, end = [], next(iter(previous.values())).time, next(iter(now.values())).time
+        for station in self.stations.values():
+            sent += station.begins(begin, end)
         if not sent and not self._channel.busy:
             return []
-        motions = {
-            name: Segment(previous[name], now[name], station.settings.transducer)
-            for name, station in self.stations.items()
-        }
+        motions: dict[str, Motion] = {name: Still(*place, begin, end) for name, place in self._places.items()}
+        for name, station in self.stations.items():
+            if name not in motions:
+                motions[name] = Segment(previous[name], now[name], station.settings.transducer)
         decided = []
         for message in sorted(sent, key=lambda m: m.sent):
             self._stamped[id(message)] = self.stations[message.source].stamped(message)
@@ -131,7 +138,8 @@ class Modems:
         station = self.stations[receiver]
         turn_around = self.stations[message.source].settings.turn_around
         delivery = station.heard(arrival, self._stamped[id(message)], turn_around)
-        heapq.heappush(self._queues[receiver], (delivery.received, self._count, delivery))
+        if receiver not in self._places:  # where nobody reads it
+            heapq.heappush(self._queues[receiver], (delivery.received, self._count, delivery))
         self._count += 1
         fates = [Fate(message, receiver, delivery.received, DELIVERED)]
         if message.asks == receiver and (why := station.answer(arrival, now)):
@@ -152,7 +160,7 @@ def build_modems(
 
     Args:
         sound: noise, losses and medium access.
-        equipment: by name of vehicle.
+        equipment: by name of vehicle, structure or beacon.
         medium: sound speed and the water's limits.
         noise: gives the generator of a source of noise by its full name.
         report: gives a vehicle's own estimate: of its name, the true time and the stamp for it.
@@ -174,7 +182,7 @@ def build_modems(
         _known(polling.master, names, "network.access.master")
     _check_replies(equipment, polling, period)
     stations = {}
-    for name, (settings, clock) in equipment.items():
+    for name, (settings, clock, *_) in equipment.items():
         tell = settings.tell
         if polling:
             own = polling.period if name == polling.master else None
@@ -190,7 +198,8 @@ def build_modems(
             polls=tuple(n for n in names if n != name) if polling and name == polling.master else (),
             asks=polling is None,
         )
-    return Modems(stations, SharedChannel(medium, sound, {n: e.modem.modem for n, e in equipment.items()}, noise))
+    channel = SharedChannel(medium, sound, {n: e.modem.modem for n, e in equipment.items()}, noise)
+    return Modems(stations, channel, {n: e.place for n, e in equipment.items() if e.place})
 
 
 def _order(access: TdmaSettings, names: list[str]) -> tuple[str, ...]:
@@ -219,9 +228,9 @@ def _check_replies(equipment: Mapping[str, Equipment], polling: PollingSettings 
     if polling:
         asked = [(polling.master, name, STATE) for name in equipment if name != polling.master]
     else:
-        for name, (settings, _) in equipment.items():
+        for name, (settings, *_) in equipment.items():
             if settings.ask.whom is not None:
-                key = f"vehicles.{name}.modem.ask.whom"
+                key = f"{equipment[name].key or f'vehicles.{name}.modem'}.ask.whom"
                 _known(settings.ask.whom, [*equipment], key)
                 if settings.ask.whom == name:
                     raise InputError(f"{key}: '{name}' cannot ask itself; name another, or none")

@@ -1,4 +1,4 @@
-"""How a point of a vehicle moves between two truths."""
+"""How a point of a vehicle moves between two truths, or stays."""
 
 from collections.abc import Sequence
 
@@ -8,6 +8,26 @@ from auvsim.acoustics.channel import Instant
 from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.interpolation import cubic_hermite
 from auvsim.physics.truth import Truth
+
+
+class Still:
+    """The way of what does not move, between two times.
+
+    Args:
+        position: (3,) NED [m].
+        heading: [rad].
+        begin, end: [s].
+    """
+
+    __slots__ = ("_instant", "begin", "end")
+
+    def __init__(self, position: Sequence[float], heading: float, begin: float, end: float) -> None:
+        self._instant = Instant(np.array(position), rotation(0.0, 0.0, heading))
+        self.begin, self.end = begin, end
+
+    def at(self, time: float) -> Instant:
+        """Where it is, and how it lies, at any time [s]."""
+        return self._instant
 
 
 class Segment:

@@ -32,12 +32,13 @@ class Modem:
 
 
 PRESETS = {
-    # WHOI Micro-Modem, frequency-hopping FSK, packet type 0: Freitag et al., OCEANS 2005.
+    # WHOI Micro-Modem, frequency-hopping FSK, packet type 0: Freitag et al., OCEANS 2005; its page on packet rates,
+    # acomms.whoi.edu/micro-modem.
     "micromodem_fsk": Modem(
-        bit_rate=80.0,  # the same
-        preamble=0.3,  # assumed
-        frequency=25_000.0,  # assumed: one of its four bands between 3 and 30 kHz, the same
-        bandwidth=4_000.0,  # assumed
+        bit_rate=80.0,  # the paper and the page
+        preamble=0.3,  # the page: a signal lasts 0.30 s longer than its packet; for type 6 in PSK, here assumed
+        frequency=25_000.0,  # assumed: one of its four bands between 3 and 30 kHz, the paper
+        bandwidth=4_000.0,  # the page
         source_level=185.0,  # assumed
         coding_gain=4.0,  # assumed: of a convolutional code of rate 1/2, which ns-3's model of it has
         processing=0.5,  # assumed
@@ -46,10 +47,10 @@ PRESETS = {
     ),
     # The same in phase-coherent keying, at the bit rate of its packet type 6.
     "micromodem_psk": Modem(
-        bit_rate=490.0,  # assumed, as cited: acomms.whoi.edu/micro-modem
-        preamble=0.3,  # assumed
+        bit_rate=490.0,  # the page
+        preamble=0.3,  # the page: 3.25 s of signal, 2.95 s of packet
         frequency=25_000.0,  # assumed, as above
-        bandwidth=5_000.0,  # assumed
+        bandwidth=5_000.0,  # the page
         source_level=185.0,  # assumed
         coding_gain=6.0,  # assumed
         processing=0.5,  # assumed

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from auvsim.acoustics.clock import ClockSettings
+from auvsim.acoustics.modem import ModemSettings
 from auvsim.acoustics.payload import NUMBERS, STATE, packet_bits
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
@@ -141,9 +143,18 @@ def odometry(scenario: Scenario, name: str, own: Way, steady: bool) -> Odometry:
 
 
 def sources(scenario: Scenario, name: str, ways: Mapping[str, Way]) -> list[Source]:
-    """What a vehicle ranges to: vehicles that tell where they are, or that it asks; beacons; the dock's USBL."""
+    """What a vehicle ranges to: modems that tell where they are, or that it asks; beacons; the dock's USBL."""
     vehicle = scenario.vehicles[name]
-    found = [s for other in ways if other != name and (s := _vehicle(scenario, name, other, ways[other])) is not None]
+    found = []
+    for other in ways:
+        its = scenario.vehicles[other]
+        if other != name and its.modem is not None:
+            told = _Teller(other, its.modem, its.clock, told_density(its), ways[other].at)
+            found.append(_told(scenario, name, told))
+    for other, fixed in scenario.fixed_modems.items():
+        told = _Teller(other, fixed.modem, fixed.clock, 0.0, lambda times, place=fixed.place: _still(times, place))
+        found.append(_told(scenario, name, told))
+    found = [source for source in found if source is not None]
     for sensor, settings in on_board(vehicle.sensors):
         if isinstance(settings, RangeSettings):
             found.append(_beacon(scenario, sensor, settings))
@@ -158,10 +169,24 @@ def is_fixed(vehicle: VehicleSettings) -> bool:
     return any(isinstance(settings, FixSettings) for _, settings in on_board(vehicle.sensors))
 
 
-def _vehicle(scenario: Scenario, name: str, other: str, way: Way) -> Source | None:
-    """Another vehicle that is heard, by one-way or two-way travel time."""
-    own, its = scenario.vehicles[name].modem, scenario.vehicles[other].modem
-    if own is None or its is None or not own.modem.hears(its.modem):
+class _Teller(NamedTuple):
+    """Who tells its place by modem."""
+
+    name: str
+    modem: ModemSettings
+    clock: ClockSettings
+    density: float  # of the error of its place along each axis [m^2 s]
+    at: Callable[[Array], Array]  # times (k,) [s] -> north, east, depth (k, 3) [m]
+
+
+def _still(times: Array, place: tuple[float, float, float]) -> Array:
+    return np.tile(np.array(place), (len(times), 1))
+
+
+def _told(scenario: Scenario, name: str, teller: _Teller) -> Source | None:
+    """A modem that is heard, by one-way or two-way travel time; the error of a beacon's chart does not count."""
+    own, its, other = scenario.vehicles[name].modem, teller.modem, teller.name
+    if own is None or not own.modem.hears(its.modem):
         return None
     if own.ask.whom == other:
         period, phase, delay = own.ask.period, own.ask.phase + own.turn_around, 0.0
@@ -172,7 +197,7 @@ def _vehicle(scenario: Scenario, name: str, other: str, way: Way) -> Source | No
     network, sender, receiver = scenario.network, its.modem, own.modem
     bits = packet_bits(NUMBERS[STATE])
     times = np.arange(phase, scenario.duration, period)
-    timing = (own.sound_speed * receiver.timing_noise) ** 2 + told_density(scenario.vehicles[other]) / period
+    timing = (own.sound_speed * receiver.timing_noise) ** 2 + teller.density / period
 
     def heard(distance: Array) -> Array:
         nodes, weights = FADES
@@ -187,7 +212,7 @@ def _vehicle(scenario: Scenario, name: str, other: str, way: Way) -> Source | No
     def bearing(distance: Array) -> Array:
         return math.radians(receiver.bearing_noise_deg or 0.0) ** 2 / heard(distance)
 
-    clocks = scenario.vehicles[other].clock, scenario.vehicles[name].clock
+    clocks = teller.clock, scenario.vehicles[name].clock
     two_way = own.ask.whom == other
     errors = {
         "range_offset": 0.0 if two_way else own.sound_speed * abs(clocks[0].offset - clocks[1].offset),
@@ -195,7 +220,7 @@ def _vehicle(scenario: Scenario, name: str, other: str, way: Way) -> Source | No
         "range_scale": abs(own.sound_speed / network.sound_speed - 1.0),
     }
     return Source(
-        name=other, times=times, places=way.at(times), range_variance=lambda distance: timing / heard(distance),
+        name=other, times=times, places=teller.at(times), range_variance=lambda distance: timing / heard(distance),
         bearing_variance=None if receiver.bearing_noise_deg is None else bearing, by_compass=True,
         delay=delay + receiver.processing + sender.duration(bits),
         errors=errors,
@@ -218,7 +243,7 @@ def _beacon(scenario: Scenario, sensor: str, s: RangeSettings) -> Source:
         return np.where(distance <= s.maximum, s.noise**2 / max(1.0 - s.dropout_probability, 1e-12), np.inf)
 
     return Source(
-        name=sensor, times=times, places=np.tile(np.array(s.beacon), (len(times), 1)), range_variance=variance,
+        name=sensor, times=times, places=_still(times, s.beacon), range_variance=variance,
         bearing_variance=None, by_compass=True, delay=0.0,
         errors={"range_offset": s.bias, "range_scale": s.scale_error},
     )  # fmt: skip

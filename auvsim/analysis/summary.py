@@ -4,9 +4,13 @@ import dataclasses
 import math
 from typing import Any
 
+import numpy as np
+
 from auvsim.analysis.estimates import estimate_errors, estimate_quality
+from auvsim.analysis.heard import heard_vehicles, relative_to
 from auvsim.base import plugins
 from auvsim.base.errors import InputError
+from auvsim.base.frames import Array
 from auvsim.data.attributes import WALL_TIME
 from auvsim.data.log import Log, VehicleLog
 from auvsim.missions import contract
@@ -27,6 +31,8 @@ def summarise(log: VehicleLog) -> dict[str, Any]:
     values["estimate"] = {
         phase: dataclasses.asdict(quality) for phase, quality in estimate_quality(errors, log.phases).items()
     }
+    if heard := heard_vehicles(log):
+        values["relative_to"] = {name: _root_mean_square(relative_to(log, name).error) for name in heard}
     if "usbl" in log:
         usbl = log["usbl"]
         values |= {
@@ -55,6 +61,11 @@ def _of_its_own(log: VehicleLog) -> dict[str, Any]:
     except (Exception, SystemExit) as error:
         text = plugins.same_each_time(" ".join(str(error).split()))[:300]
         return {NO_METRICS: text if isinstance(error, InputError) else f"{type(error).__name__}: {text}"}
+
+
+def _root_mean_square(errors: Array) -> float:
+    """Of vectors (k, 2); NaN of none."""
+    return math.sqrt(float(np.square(errors).sum(axis=1).mean())) if len(errors) else math.nan
 
 
 def _plain(value: Any) -> Any:

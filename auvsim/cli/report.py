@@ -199,6 +199,9 @@ def show(summary: Mapping[str, Any]) -> None:
         where = "all phases" if phase == "all" else phase.replace("_", " ")
         cells = (_errors(values["estimate"].get(phase)) for values in vehicles.values())
         table.add_row(f"position rms [m], NEES per degree of freedom, {where}", *cells)
+    for other in dict.fromkeys(name for values in vehicles.values() for name in values.get("relative_to", ())):
+        cells = (values.get("relative_to", {}).get(other, "") for values in vehicles.values())
+        table.add_row(f"position rms relative to {other}, as it knows its own [m]", *map(_text, cells))
     Console(markup=False).print(table)  # units stand in brackets
 
 

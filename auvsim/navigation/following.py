@@ -30,7 +30,7 @@ from estimators.core.models.process import MotionProcess
 from estimators.core.types import Gaussian, Measurement
 from estimators.docking.aids import BOTTOM, GYRO, RANGE, WATER
 from estimators.docking.sensors import COMPASS
-from estimators.motion_radius.geometry import Geometry
+from estimators.motion_radius.geometry import MIN_RANGES, Geometry
 
 SPEED, TURNING, GYRO_BIAS = 2.0, 0.1, 1e-3  # not known at first: velocities [m/s], yaw rate, bias of a gyro [rad/s]
 
@@ -126,6 +126,8 @@ class RangeNavigator(OverHistory):
 
     def _warnings(self, belief: Gaussian) -> tuple[str, ...]:
         """Why the geometry cannot tell; one filter knows of no second solution."""
+        if self._geometry.ranges < MIN_RANGES:
+            return ()
         return self._geometry.warnings(belief.mean[None], belief.covariance[None], np.ones(1))
 
     def _used(self, range_: Measurement) -> list[Measurement]:

@@ -23,6 +23,7 @@ from estimators.core.history import History
 from estimators.core.models.odometry import SPACE, OdometryNoise
 from estimators.core.types import Gaussian
 from estimators.motion_radius.bank import BankFilter
+from estimators.motion_radius.geometry import MIN_RANGES
 from estimators.motion_radius.ranges import SHARED, leader_range
 
 
@@ -106,7 +107,7 @@ class MotionRadiusNavigator:
             refused=sum(history.refused.values()),
             reasons=dict(history.refused),
             reinitialised=history.reinitialised,
-            warnings=state.warnings if state is not None else (),
+            warnings=state.warnings if state is not None and state.accepted >= MIN_RANGES else (),
             outcomes=history.outcomes,
         )
 

@@ -69,7 +69,10 @@ def required(setup: NavigatorSetup, *needs: tuple[str, bool]) -> None:
     Raises:
         InputError: Something is missing.
     """
-    heard = ("another vehicle with a modem (vehicles.NAME.modem: {}), of which there is none", bool(setup.others))
+    heard = (
+        "another vehicle, a structure or a beacon with a modem (vehicles.NAME.modem: {}), of which there is none",
+        bool(setup.others),
+    )
     for what, given in (("a modem (modem: {})", setup.modem is not None), heard, *needs):
         if not given:
             raise InputError(f"estimator '{setup.settings.kind}' of '{setup.vehicle}': needs {what}")

@@ -34,6 +34,7 @@ from auvsim.simulation.building import (
     structure_model,
     vehicle_model,
 )
+from auvsim.simulation.fixed_stations import FixedStation
 from auvsim.simulation.parts import PartError
 from auvsim.simulation.recording import Unrecorded, recorder
 from auvsim.simulation.scenario import Scenario
@@ -251,15 +252,17 @@ class Simulation:
             self._log_fate(fate)
 
     def _modems(self, noise: Callable[[str], Generator]) -> Modems | None:
-        """The modems of the vehicles that have one."""
+        """The modems of vehicles, structures and beacons."""
         plan, agents = self.scenario, {agent.name: agent for agent in self.agents}
         equipment = {name: Equipment(v.modem, v.clock) for name, v in plan.vehicles.items() if v.modem}
+        fixed = {name: FixedStation(found, noise(f"{name}/chart")) for name, found in plan.fixed_modems.items()}
+        equipment |= {name: station.equipment for name, station in fixed.items()}
         if not equipment:
             return None
         medium = plan.network.medium(getattr(self.world, "terrain", plan.world.floor).depth, plan.water.sea_floor)
 
         def report(name: str, time: float, stamp: float) -> Any:
-            return agents[name].report(time, stamp)
+            return fixed[name].report(stamp) if name in fixed else agents[name].report(time, stamp)
 
         return build_modems(plan.network, equipment, medium, noise, report, 1.0 / plan.rates.control)
 
@@ -284,7 +287,7 @@ class Simulation:
         """Logs where a receiver begins to lose the packets of a sender for a reason."""
         link = (fate.message.source, fate.destination)
         before, self._fates[link] = self._fates.get(link), fate.fate
-        if fate.fate not in (DELIVERED, before):
+        if fate.fate not in (DELIVERED, before) and fate.destination in self.truths:  # which docks and beacons are not
             self.log.event(time, fate.destination, "lost", f"packet of {link[0]}: {fate.fate}")
 
     def _report_limits(self, time: float) -> None:

@@ -3,7 +3,7 @@
 import json
 import math
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 from pydantic import Field, StringConstraints, ValidationError, model_validator
 
@@ -96,8 +96,19 @@ class VehicleSettings(Settings):
     clock: ClockSettings = ClockSettings()
 
 
+class FixedModem(NamedTuple):
+    """A modem that stays where it is and tells that place."""
+
+    key: str  # dotted, of its settings
+    modem: ModemSettings
+    clock: ClockSettings
+    place: tuple[float, float, float]  # north, east, depth [m]
+    heading: float  # [rad]
+    chart: float  # error of the place that it tells, sd along north and east [m]
+
+
 class StructureSettings(Settings):
-    """A dock: its model and where it is."""
+    """A dock: its model, where it is, and its modem if it has one."""
 
     model: str = Field(default="dock", description="a folder in models/, or the path of an .xml file")
     north: float = Field(default=0.0, description="north of the datum, centre of the mouth [m]")
@@ -106,6 +117,10 @@ class StructureSettings(Settings):
     heading_deg: float = Field(
         default=0.0, description="course of a vehicle that enters along the axis, clockwise from north [deg]"
     )
+    modem: ModemSettings | None = Field(
+        default=None, description="acoustic modem at its mouth, which tells that place; none: it has none"
+    )
+    clock: ClockSettings = ClockSettings()
 
     @property
     def pose(self) -> StructurePose:
@@ -134,10 +149,25 @@ class PhysicsSettings(Settings):
     )
 
 
+class BeaconSettings(Settings):
+    """A modem at a fixed place, on the sea floor or below a buoy, which tells that place as a vehicle tells its own."""
+
+    north: float = Field(default=0.0, description="north of the datum [m]")
+    east: float = Field(default=0.0, description="east of the datum [m]")
+    depth: float = Field(default=5.0, gt=0.0, le=12_000.0, description="depth [m]")
+    chart: float = Field(
+        default=0.0, ge=0.0, le=1000.0,
+        description="error of the place that it tells, sd along north and east, drawn for each run [m]",
+    )  # fmt: skip
+    modem: ModemSettings = ModemSettings()
+    clock: ClockSettings = ClockSettings()
+
+
 class NetworkSettings(SoundSettings):
-    """What carries messages: the water for modems, and the link of a dock's USBL."""
+    """What carries messages: the water for modems, those at fixed places, and the link of a dock's USBL."""
 
     acoustics: AcousticSettings = AcousticSettings()
+    beacons: dict[Name, BeaconSettings] = Field(default={}, description="modems at fixed places, by name")
 
 
 class WalkStep(Settings):
@@ -227,6 +257,16 @@ class Scenario(Settings):
                 raise ValueError(f"{key}: '{one}' has no modem; give vehicles.{one}.modem, or no leaders")
 
     @model_validator(mode="after")
+    def _modems_have_names_of_their_own(self) -> "Scenario":
+        for name in self.network.beacons:
+            if name in self.vehicles or name in self.structures:
+                raise ValueError(f"network.beacons.{name}: a vehicle or structure has that name; give it another")
+        for name, structure in self.structures.items():
+            if structure.modem and name in self.vehicles:
+                raise ValueError(f"structures.{name}.modem: a vehicle has that name; give the structure another")
+        return self
+
+    @model_validator(mode="after")
     def _all_in_the_water(self) -> "Scenario":
         if self.water.terrain.kind != "grid":  # whose file is read when the run begins
             try:
@@ -245,6 +285,27 @@ class Scenario(Settings):
         if len(self.vehicles) != 1:
             raise InputError(f"the scenario has {len(self.vehicles)} vehicles ({', '.join(self.vehicles)}), not one")
         return next(iter(self.vehicles.items()))
+
+    @property
+    def fixed_modems(self) -> dict[str, FixedModem]:
+        """The modems that are on no vehicle: of structures and beacons, by name."""
+        found = {
+            name: FixedModem(
+                f"structures.{name}.modem", s.modem, s.clock, (s.north, s.east, s.depth), s.pose.heading, 0.0
+            )
+            for name, s in self.structures.items()
+            if s.modem
+        }
+        for name, b in self.network.beacons.items():
+            found[name] = FixedModem(
+                f"network.beacons.{name}.modem", b.modem, b.clock, (b.north, b.east, b.depth), 0.0, b.chart
+            )
+        return found
+
+    @property
+    def modem_names(self) -> list[str]:
+        """All that have a modem: vehicles, structures, beacons."""
+        return [*(name for name, vehicle in self.vehicles.items() if vehicle.modem), *self.fixed_modems]
 
     @property
     def world(self) -> WorldSettings:
@@ -326,6 +387,8 @@ def _places(scenario: Scenario) -> Iterator[tuple[str, float, float, float]]:
     """Dotted key of its depth, north, east, down [m] of all that a scenario places in the water."""
     for name, structure in scenario.structures.items():
         yield f"structures.{name}.depth", structure.north, structure.east, structure.depth
+    for name, beacon in scenario.network.beacons.items():
+        yield f"network.beacons.{name}.depth", beacon.north, beacon.east, beacon.depth
     for name, vehicle in scenario.vehicles.items():
         yield f"vehicles.{name}.start.depth", *scenario.start_position(name)
         if isinstance(vehicle.mission, FormationSettings):

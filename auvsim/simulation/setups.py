@@ -40,7 +40,7 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
     if not isinstance(vehicle.actuation, Thrusters):
         with at_key(f"vehicles.{name}.estimator.model"):
             parameters = motion_models.assumed(assumed.model, own.model, model_speed(assumed), plan.water.density)
-    others = tuple(other for other, settings in plan.vehicles.items() if settings.modem and other != name)
+    others = tuple(other for other in plan.modem_names if other != name)
     return NavigatorSetup(
         vehicle=name,
         settings=assumed,
@@ -53,6 +53,6 @@ def navigator_setup(plan: Scenario, name: str, vehicle: Vehicle, settings: Any =
         sensors=dict(on_board(own.sensors)),
         modem=own.modem,
         others=others,
-        ranging=tuple(other for other in others if plan.vehicles[other].estimator.kind in RANGING),
+        ranging=tuple(n for n in others if n in plan.vehicles and plan.vehicles[n].estimator.kind in RANGING),
         start=plan.start_position(name)[:2],
     )

@@ -18,6 +18,7 @@ STUDIES = {  # name of the module: its line of help
     "time_steps": "What a time step costs: position after a minute by integrator and rate, contact by rate.",
     "identified_docking": "The same docking trials with the fitted, the identified and a wrong planar model.",
     "formation": "Four vehicles in formation: station keeping, and what the leaders' shape is worth to the follower.",
+    "mission_bound": "Followers in MuJoCo against the map of `auvsim bound`, at stations where it sees and is blind.",
     "survey": "Surveys by sonar, with and without loop closures, beside dead reckoning: path errors, NEES, docked.",
 }
 
