@@ -199,7 +199,7 @@ class SonarNavigator(ReckoningNavigator):
 
     @property
     def dive(self) -> tuple[float, np.ndarray] | None:
-        """When the first dive began [s], after the last fix at the surface, and the pose (3,) there, given all so far."""
+        """When the first dive began [s], after the last fix at the surface, and the pose (3,) there, by all so far."""
         state = self._estimator.history.state
         return state.mark if isinstance(state, KeyframeState) else None
 
