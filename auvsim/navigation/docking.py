@@ -180,6 +180,8 @@ class DockingNavigator:
 
 
 def _unit(bias: str) -> str:
+    if bias.startswith("range_"):
+        return "1" if bias.startswith("range_scale_") else "m"
     return "rad" if bias.startswith("light_") else BIAS_UNITS.get(bias, "1")
 
 

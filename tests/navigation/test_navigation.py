@@ -5,7 +5,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
 from estimators.core.types import Measurement
 from estimators.docking.estimator import UsblFix
-from estimators.docking.noise import DockingNoise
+from estimators.docking.noise import Bias, DockingNoise
 
 DOCK = StructurePose(north=400.0, east=-300.0, depth=20.0, heading=0.7, pitch=0.05, roll=-0.04)
 MOUTH = DOCK.position[:2]
@@ -407,3 +407,11 @@ def test_what_is_refused_is_counted_by_reason() -> None:
     assert estimator_events(counts, counts) == []
     anew = estimator_events(counts, replace(counts, reinitialised=1))
     assert [kind for kind, _ in anew] == ["reinitialised"]
+
+
+def test_constant_errors_are_states_in_their_units() -> None:
+    recorder = Recorder()
+    units = {"compass": "rad", "dvl_sway": "m/s", "range_a": "m", "range_scale_a": "1", "light_eye": "rad"}
+    recorder.filter.noise = DockingNoise(biases=dict.fromkeys(units, Bias(0.1)))
+    states = DockingNavigator(cast(Any, recorder), library.vehicle("remus100").actuation, MOUTH).states
+    assert {name: states[f"{name}_bias"] for name in units} == units
