@@ -252,9 +252,9 @@ class Docking(Mission):
             return self._on_course(here, path.course_to(here, abeam), speed)
         away = math.hypot(here.along - gate[0], here.cross - gate[1])
         if self._waits_for or away < self._s.gate_radius:
-            self._waits_for = (
-                not_ready(here, distance, self._way_through_water(here, min(distance, -here.along)), self._s) or ""
-            )
+            left = min(distance, -here.along)
+            way = speeds.way_through_water(left, self._line(here), self._speed(here), here.current)
+            self._waits_for = not_ready(here, distance, way, self._s) or ""
             if not self._waits_for and away < 2.0 * self._s.gate_radius:
                 hopeless = self._too_strong(here)
                 if hopeless:
@@ -268,12 +268,6 @@ class Docking(Mission):
             self._enter(Phase.ABORTED, time, reason)
             return Setpoints(here.heading, self.dock_depth, 0.0)
         return self._on_course(here, path.course_to(here, gate), speed)
-
-    def _way_through_water(self, here: Relative, distance: float) -> float:
-        """Way through the water of an approach over a distance [m]."""
-        speed = self._speed(here)
-        over_ground = speeds.ground_speed_along(self._line(here), speed, here.current)
-        return distance * speed / max(over_ground, HOPELESS)
 
     def _on_course(self, here: Relative, course: float, speed: float) -> Setpoints:
         return Setpoints(heading_for_course(course, speed, here.current), self.dock_depth, speed)

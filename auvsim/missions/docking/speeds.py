@@ -5,6 +5,8 @@ import math
 from auvsim.base.frames import wrap
 from auvsim.missions.line_of_sight import heading_for_course
 
+SLOWEST = 0.1  # speed over ground that is reckoned with at least [m/s]
+
 
 def approach_course(axis: float, speed: float, current: tuple[float, float], limit: float) -> float:
     """Course over ground of the approach line [rad]: the axis, or turned to keep the heading within `limit` of it.
@@ -56,6 +58,18 @@ def ground_speed_along(line: float, speed: float, current: tuple[float, float]) 
     if abs(across) >= speed:
         return along - speed
     return math.sqrt(speed * speed - across * across) + along
+
+
+def way_through_water(distance: float, line: float, speed: float, current: tuple[float, float]) -> float:
+    """Way through the water [m] of a distance over ground [m] along a course [rad].
+
+    Args:
+        distance: [m].
+        line: The course [rad].
+        speed: Through the water [m/s].
+        current: North, east [m/s].
+    """
+    return distance * speed / max(ground_speed_along(line, speed, current), SLOWEST)
 
 
 def fastest(holds, slowest: float = 0.2, highest: float = 8.0) -> float:
