@@ -144,7 +144,7 @@ def test_an_approach_waits_for_depth_by_the_way_through_the_water() -> None:
     assert not_ready(at(below=-15.0), 200.0, 120.0, settings) == "15.0 m above the dock"
 
 
-@pytest.mark.parametrize(("current", "way"), [((0.0, 0.25), 160.0), ((0.0, -0.2), 250.0), ((0.6, 0.0), 250.0)])
+@pytest.mark.parametrize(("current", "way"), [((0.0, 0.5), 160.0), ((0.0, -0.4), 250.0), ((1.2, 0.0), 250.0)])
 def test_way_through_the_water_is_that_of_the_drifting_vehicle(current: tuple[float, float], way: float) -> None:
-    """East for 200 m at 1 m/s: 1.25 and 0.8 m/s over ground; across 0.6 m/s, 0.8 m/s are left."""
-    assert speeds.way_through_water(200.0, math.pi / 2, 1.0, current) == pytest.approx(way)
+    """East for 200 m at 2 m/s: 2.5 and 1.6 m/s over ground; across 1.2 m/s, 1.6 m/s are left."""
+    assert speeds.way_through_water(200.0, math.pi / 2, 2.0, current) == pytest.approx(way)
