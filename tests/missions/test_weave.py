@@ -169,6 +169,7 @@ def test_sources_are_those_of_the_settings():
     ranged, fixed = fix_sources([object(), a], (usbl, (4.0, 5.0, 6.0)), link)
     assert (ranged.place, ranged.interval, ranged.maximum, ranged.bearing) == ((1.0, 2.0, 3.0), 2.5, 90.0, False)
     assert (fixed.place, fixed.interval, fixed.maximum, fixed.bearing) == ((4.0, 5.0, 6.0), 10.0, math.inf, True)
+    assert (ranged.mount, fixed.mount) == ((0.0, 0.0, 0.0), usbl.transceiver)
     assert (ranged.deviation(50.0), fixed.deviation(100.0)) == (0.3, pytest.approx(2.0 * 0.339))
     assert len(fix_sources([a], None, link)) == 1
     (never,) = fix_sources([], (usbl, (0.0, 0.0, 0.0)), AcousticSettings(dropout_probability=1.0))
