@@ -11,7 +11,7 @@ from estimators.map_path.keyframes import MARK, MARKED, KeyframeFilter, Keyframe
 from estimators.map_path.likelihood import Matcher
 from estimators.map_path.odometry import OdometryNoise
 from estimators.map_path.poses import Input
-from estimators.map_path.window import WindowFilter
+from estimators.map_path.window import Window, WindowFilter
 
 TURN = np.radians(9.0)  # a circle of 40 s: the second round sees the floor of the first from the same side
 
@@ -48,6 +48,21 @@ def test_without_keyframes_it_is_the_window():
     window, keyframes = filters(run)
     first, second = followed(window, run)[1], followed(keyframes, run)[1]
     np.testing.assert_allclose(second, first, atol=1e-9)
+
+
+def test_each_third_frame_is_matched_and_weighs_by_the_factor_of_its_covariance(rounds):
+    """Of others there is no innovation; ten times the covariance makes the position less sure, by less than that."""
+    spreads = []
+    for factor in (1.0, 10.0):
+        window = Window(kept=4, lags=(1, 3), interval=3, covariance_factor=factor)
+        estimator = Estimator(filters(rounds, window=window)[1], step=1.0, keep=3.0)
+        for k in range(10):
+            result = estimator.tick(
+                float(k), rounds.inputs[k - 1][:2] if k else (0.0, 0.0), [rounds.frames[k].measurement()]
+            )
+            assert [np.isfinite(o.nis) for o in result.outcomes] == [k > 0 and k % 3 == 0]
+        spreads.append(np.trace(result.belief.covariance[:2, :2]) - np.trace(START[:2, :2]))
+    assert 1.3 * spreads[0] < spreads[1] < 10.0 * spreads[0]
 
 
 def test_frames_that_are_kept_have_their_numbers_and_stamps(rounds):
