@@ -193,16 +193,20 @@ def depth_limits(axes: Axes, *depths: Array) -> None:
 def estimates_figure(log: VehicleLog) -> Figure:
     """The figure that `estimates` writes."""
     figure = Figure(figsize=SIZE, layout="constrained")
-    grid = figure.add_gridspec(4, 2)
     errors = estimate_errors(log)
-    panels = (
+    panels = [
         ("North", "error [m]", errors.position[:, 0], errors.sigma[:, 0]),
         ("East", "error [m]", errors.position[:, 1], errors.sigma[:, 1]),
         ("Heading", "error [deg]", np.degrees(errors.heading), np.degrees(errors.sigma[:, 2])),
         ("Surge through the water", "error [m/s]", errors.velocity[:, 0], errors.sigma[:, 3]),
         ("Current north", "error [m/s]", errors.current[:, 0], errors.sigma[:, 6]),
         ("Current east", "error [m/s]", errors.current[:, 1], errors.sigma[:, 7]),
-    )
+    ]
+    if not (np.nan_to_num(log["estimate"]["current"]).any() or errors.sigma[:, 6:].any()):
+        del panels[4:]  # it knows of no current
+    panels = [panel for panel in panels if np.isfinite(panel[2][errors.initialised]).any()] or panels[:2]
+    rows = (len(panels) + 1) // 2
+    grid = figure.add_gridspec(rows + 1, 2)
     free = _while_moving(log)
     for index, (title, unit, error, sigma) in enumerate(panels):
         axes = figure.add_subplot(grid[index // 2, index % 2], sharex=figure.axes[0] if index else None)
@@ -211,7 +215,7 @@ def estimates_figure(log: VehicleLog) -> Figure:
         event_ticks(axes, log)
         dress(axes, title, "", unit)
         axes.tick_params(labelbottom=index >= len(panels) - 2)
-    axes = figure.add_subplot(grid[3, :], sharex=figure.axes[0])
+    axes = figure.add_subplot(grid[rows, :], sharex=figure.axes[0])
     _nees(axes, log, errors)
     consistency = _consistency(estimate_quality(errors, log.phases)["all"])
     figure.suptitle(f"Estimate minus truth, {which_run(log)}: {consistency}", fontsize=13)

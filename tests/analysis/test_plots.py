@@ -70,6 +70,17 @@ def test_png_of_the_announced_size(plot: Callable, make: Callable, tmp_path: Pat
     assert [entry.name for entry in tmp_path.iterdir()] == ["picture.png"]
 
 
+def test_a_quantity_that_is_never_known_has_no_panel(log: VehicleLog, errors: Any, monkeypatch: pytest.MonkeyPatch):
+    """Without numbers of the current its two panels go, the other five stay."""
+    known = estimate_errors(log)
+    blank = dataclasses.replace(known, current=np.full_like(known.current, np.nan))
+    monkeypatch.setattr("auvsim.analysis.plots.estimate_errors", lambda log: blank)
+    titles = [axes.get_title() for axes in estimates_figure(log).axes]
+    every = [axes.get_title() for axes in errors.axes]
+    assert [title for title in every if title.startswith("Current")] == ["Current north", "Current east"]
+    assert titles == [title for title in every if not title.startswith("Current")]
+
+
 def test_plan_shows_truth_estimate_fixes_and_dock(log: VehicleLog, way: Any):
     plan = panel(way, "Plan view")
     east_north = log["truth"]["position"][:, 1::-1]

@@ -6,12 +6,12 @@ import pytest
 from auvsim.reproduce.paper5.methods import START, frame_model
 from auvsim.reproduce.paper5.scenes import GRID, SATURATION, Conditions, arc, simulate
 from estimators.core.estimator import Estimator
-from estimators.core.types import Gaussian
-from estimators.map_path.keyframes import KeyframeFilter, Keyframes
+from estimators.core.types import Gaussian, Measurement
+from estimators.map_path.keyframes import MARK, MARKED, KeyframeFilter, Keyframes
 from estimators.map_path.likelihood import Matcher
 from estimators.map_path.odometry import OdometryNoise
 from estimators.map_path.poses import Input
-from estimators.map_path.window import WindowFilter
+from estimators.map_path.window import Window, WindowFilter
 
 TURN = np.radians(9.0)  # a circle of 40 s: the second round sees the floor of the first from the same side
 
@@ -50,11 +50,51 @@ def test_without_keyframes_it_is_the_window():
     np.testing.assert_allclose(second, first, atol=1e-9)
 
 
+def test_each_third_frame_is_matched_and_weighs_by_the_factor_of_its_covariance(rounds):
+    """Of others there is no innovation; ten times the covariance makes the position less sure, by less than that."""
+    spreads = []
+    for factor in (1.0, 10.0):
+        window = Window(kept=4, lags=(1, 3), interval=3, covariance_factor=factor)
+        estimator = Estimator(filters(rounds, window=window)[1], step=1.0, keep=3.0)
+        for k in range(10):
+            result = estimator.tick(
+                float(k), rounds.inputs[k - 1][:2] if k else (0.0, 0.0), [rounds.frames[k].measurement()]
+            )
+            assert [np.isfinite(o.nis) for o in result.outcomes] == [k > 0 and k % 3 == 0]
+        spreads.append(np.trace(result.belief.covariance[:2, :2]) - np.trace(START[:2, :2]))
+    assert 1.3 * spreads[0] < spreads[1] < 10.0 * spreads[0]
+
+
 def test_frames_that_are_kept_have_their_numbers_and_stamps(rounds):
     state, _ = followed(filters(rounds, keyframes=Keyframes(spacing=7, closures=False))[1], rounds)
     assert state.numbers == (*range(0, 49, 7), *range(49, 61))
     assert state.stamps == tuple(float(k) for k in state.numbers)
     assert state.whole.mean.size == 5 + 3 * len(state.numbers)
+
+
+def test_a_marked_pose_stays_in_the_state_and_moves_with_what_is_learnt(rounds):
+    """It is the vehicle's at its time, with its covariances; it outlives the window; a second mark is not taken."""
+    estimator = Estimator(filters(rounds, keyframes=Keyframes(spacing=7, closures=False))[1], step=1.0, keep=3.0)
+    marks = [
+        Measurement(kind=MARK, value=np.zeros(1), covariance=np.eye(1), stamp=stamp, received=stamp)
+        for stamp in (3.0, 5.0)
+    ]
+    then = None
+    for k in range(25):
+        u = rounds.inputs[k - 1][:2] if k else (0.0, 0.0)
+        estimator.tick(float(k), u, [rounds.frames[k].measurement(), *(m for m in marks if m.stamp == k)])
+        state = estimator.history.state
+        if k == 3:
+            n, then = state.size, state.mark[1]
+            # The frame of the same time may come after it, and corrects both alike but for the match's own part.
+            whole = state.whole
+            np.testing.assert_allclose(whole.mean[n : n + 3], whole.mean[:3], atol=1e-9)
+            np.testing.assert_allclose(whole.covariance[n : n + 3, :n], whole.covariance[:3, :n], atol=1e-9)
+    assert state.mark[0] == 3.0
+    assert state.numbers == (MARKED, 0, 7, *range(13, 25))
+    assert len(state.poses) == len(state.numbers) == len(state.frames) == len(state.stamps)
+    assert not np.array_equal(state.mark[1], then)
+    assert np.hypot(*(state.mark[1] - then)[:2]) < 0.2  # what a few frames tell of a pose 4.5 m from the start
 
 
 def test_a_second_round_closes_loops_and_mends_the_whole_path(rounds):
