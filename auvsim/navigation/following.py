@@ -86,6 +86,7 @@ class RangeNavigator(OverHistory):
         self._tilt = (0.0, 0.0)  # pitch and roll by the compass [rad]
         self._belief: Gaussian | None = None
         self._geometry, self._since = Geometry(), Displacement()  # of the ranges so far, and the way since the last
+        self._judged, self._warnings = 0, ()  # after how many ranges the geometry was judged last, and how
 
     def update(self, time: float, readings: Sequence[Reading], messages: Sequence[Delivery], commands: Any) -> Estimate:
         """The estimate now, from the readings, messages and commands since the last update."""
@@ -107,7 +108,8 @@ class RangeNavigator(OverHistory):
         self._belief = result.belief
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
         mean = belief.mean
-        self._since = self._since.extended(mean[3], mean[4], mean[2], self._period, self._odometry)
+        heading, ahead, starboard = mean[2:5].tolist()
+        self._since = self._since.extended(ahead, starboard, heading, self._period, self._odometry)
         return Estimate(
             time=time,
             position=np.array((mean[0], mean[1], self._depth.at(time) or 0.0)),
@@ -121,14 +123,16 @@ class RangeNavigator(OverHistory):
             reasons=result.refused,
             reinitialised=result.reinitialised,
             outcomes=result.outcomes,
-            warnings=self._warnings(belief) if result.belief else (),
+            warnings=self._doubts(belief) if result.belief else (),
         )
 
-    def _warnings(self, belief: Gaussian) -> tuple[str, ...]:
-        """Why the geometry cannot tell; one filter knows of no second solution."""
-        if self._geometry.ranges < MIN_RANGES:
-            return ()
-        return self._geometry.warnings(belief.mean[None], belief.covariance[None], np.ones(1))
+    def _doubts(self, belief: Gaussian) -> tuple[str, ...]:
+        """Why the geometry cannot tell, judged anew at each range; one filter knows of no second solution."""
+        geometry = self._geometry
+        if geometry.ranges > max(self._judged, MIN_RANGES - 1):
+            self._judged = geometry.ranges
+            self._warnings = geometry.warnings(belief.mean[None], belief.covariance[None], np.ones(1))
+        return self._warnings
 
     def _used(self, range_: Measurement) -> list[Measurement]:
         """A range, if it says anything; the way since the last one goes into the geometry."""

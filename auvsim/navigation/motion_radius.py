@@ -22,7 +22,7 @@ from estimators.core.fusion import cautious_variance
 from estimators.core.history import History
 from estimators.core.models.odometry import SPACE, OdometryNoise
 from estimators.core.types import Gaussian
-from estimators.motion_radius.bank import BankFilter
+from estimators.motion_radius.bank import BankFilter, BankState
 from estimators.motion_radius.geometry import MIN_RANGES
 from estimators.motion_radius.ranges import SHARED, leader_range
 
@@ -70,6 +70,7 @@ class MotionRadiusNavigator:
         )
         self._odometry, self._listener = Odometry(self._setup, slice(3, 6)), Listener(self._modem)
         self._place: tuple[float, float] = planned_start(self._setup)
+        self._judged, self._warnings = 0, ()  # after how many ranges they were judged last, and how
         position = self._setup.settings.position**2
         self._spread = position, 0.0, position  # variances of north and of both, of east [m2]
 
@@ -107,9 +108,15 @@ class MotionRadiusNavigator:
             refused=sum(history.refused.values()),
             reasons=dict(history.refused),
             reinitialised=history.reinitialised,
-            warnings=state.warnings if state is not None and state.accepted >= MIN_RANGES else (),
+            warnings=self._doubts(state) if state is not None else (),
             outcomes=history.outcomes,
         )
+
+    def _doubts(self, state: BankState) -> tuple[str, ...]:
+        """Why the estimate may be wrong, judged anew at each range."""
+        if state.accepted > max(self._judged, MIN_RANGES - 1):
+            self._judged, self._warnings = state.accepted, state.warnings
+        return self._warnings
 
     def _measured(self, sight: Sight) -> Any:
         assert sight.range is not None

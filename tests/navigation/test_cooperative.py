@@ -1,10 +1,13 @@
 """Followers with the estimators of papers 2 and 3 in whole runs: they are right, and as wrong as they say."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from auvsim import load_scenario
 from auvsim.base.errors import InputError
+from auvsim.navigation.estimate import Estimate, estimator_events
 from auvsim.navigation.heard import along, bend
 from auvsim.simulation.run import Simulation, run
 
@@ -113,3 +116,17 @@ def test_an_extended_filter_does_not_think_that_it_sees_what_nobody_can(follows_
     """Six runs of 900 s; to first order alone NEES is 1400 in parallel, where rank is 2 of 4."""
     logs = [run(straight("range_ekf", 900.0, follows_deg=follows_deg), seed=s) for s in range(6)]
     assert np.mean([judged(log, 250.0)[1] for log in logs]) < most
+
+
+def test_doubts_are_told_where_they_begin_and_when_they_end():
+    """Numbers in a doubt may change without a further event; another doubt is one."""
+    sure = Estimate.unknown(0.0)
+    blind, longer, mirror = (
+        replace(sure, warnings=warnings)
+        for warnings in (("rank 2: 30 s",), ("rank 2: 32 s",), ("rank 2: 34 s", "mirror: 0.1"))
+    )
+    assert estimator_events(None, sure) == []
+    assert estimator_events(sure, blind) == [("doubtful", "rank 2: 30 s")]
+    assert estimator_events(blind, longer) == []
+    assert estimator_events(longer, mirror) == [("doubtful", "mirror: 0.1")]
+    assert [kind for kind, _ in estimator_events(mirror, sure)] == ["told"]

@@ -224,7 +224,10 @@ def test_a_range_filter_without_modem_or_log_is_refused():
 
 
 def test_a_follower_with_nobody_to_hear_is_refused():
-    with pytest.raises(InputError, match=r"'follower': needs another vehicle with a modem .*, of which there is none"):
+    with pytest.raises(
+        InputError,
+        match=r"'follower': needs another vehicle, a structure or a beacon with a modem .*, of which there is none",
+    ):
         Simulation(plan(vehicles={"leader": {"modem": None}}), seed=0)
 
 
