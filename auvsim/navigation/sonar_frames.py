@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
 
 from auvsim.base.frames import Array
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame, to_sector
@@ -59,6 +58,8 @@ class SectorFrames:
 
     def _detailed(self, image: Array) -> Array:
         """An image (rows, columns) without the mean of each cell's surroundings, of the cells that are seen."""
+        from scipy.ndimage import gaussian_filter
+
         width = SURROUNDINGS / self.grid.cell
         shares = np.maximum(gaussian_filter(self.grid.seen.astype(float), width), 1e-12)
         return image - gaussian_filter(image, width) / shares

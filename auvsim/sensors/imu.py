@@ -6,7 +6,6 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.random import Generator
 from pydantic import Field
-from scipy.spatial.transform import Rotation
 
 from auvsim.base.frames import Array, rotation
 from auvsim.base.reading import Reading
@@ -81,6 +80,8 @@ def _six(gyro: float, accelerometer: float) -> Array:
 
 def _increments(before: Truth, now: Truth) -> Array:
     """Turn [rad] and change of velocity less gravity's [m/s] (6,) between two truths, in the axes half-way."""
+    from scipy.spatial.transform import Rotation
+
     first, last = (Rotation.from_matrix(rotation(*truth.attitude.tolist())) for truth in (before, now))
     turn = (first.inv() * last).as_rotvec()
     velocities = last.apply(now.nu[:3]) - first.apply(before.nu[:3]) - GRAVITY * (now.time - before.time)

@@ -7,7 +7,6 @@ from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
-from scipy.io import netcdf_file
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
@@ -76,6 +75,8 @@ def read_variables(path: Path) -> dict[str, Variable]:
 
 
 def _classic(path: Path) -> dict[str, Variable]:
+    from scipy.io import netcdf_file
+
     with netcdf_file(path, mmap=False) as file:
         return {
             name: _unpacked(item.dimensions, np.array(item[...]), dict(item._attributes))

@@ -3,7 +3,6 @@
 from bisect import bisect_right
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from auvsim.base.frames import Array
 from auvsim.base.interpolation import cubic_hermite
@@ -17,6 +16,8 @@ class Shear:
     steady_uniform = False
 
     def __init__(self, settings: ShearSettings) -> None:
+        from scipy.interpolate import PchipInterpolator
+
         self._linear = settings.profile == "linear"
         self._depths = [point.depth for point in settings.points]
         velocities = np.array([horizontal(point.speed, point.direction_deg) for point in settings.points])

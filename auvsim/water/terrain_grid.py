@@ -5,7 +5,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from auvsim.base.frames import Array
 
@@ -39,6 +38,8 @@ class GriddedFloor:
 
     def coarse(self, most: int) -> "GriddedFloor":
         """The floor on at most so many points along each side, which lie on it."""
+        from scipy.ndimage import map_coordinates
+
         rows, columns = self.depths.shape
         if max(rows, columns) <= most:
             return self

@@ -4,7 +4,6 @@ import math
 
 import numpy as np
 from numpy.random import Generator
-from scipy.optimize import brentq
 
 from auvsim.base.frames import Array
 from auvsim.water.field import Water, horizontal
@@ -24,6 +23,8 @@ def jonswap(ratio: Array, peakedness: float) -> Array:
 
 def wave_number(frequency: float, floor: float) -> float:
     """k [1/m] of linear waves, omega^2 = g k tanh(k h), at a frequency [rad/s] over a depth h [m]."""
+    from scipy.optimize import brentq
+
     deep, shallow = frequency**2 / GRAVITY, frequency / math.sqrt(GRAVITY * floor)
     low, high = 0.999 * max(deep, shallow), 1.001 * (deep + shallow)
 

@@ -3,7 +3,6 @@
 import math
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from estimators.core.bounds import inverse
 from estimators.core.types import Array, Gaussian, wrapped
@@ -25,6 +24,8 @@ def intersect(
         return -float(np.linalg.slogdet(w * A + (1.0 - w) * B)[1])
 
     if weight is None:
+        from scipy.optimize import minimize_scalar
+
         found = float(minimize_scalar(log_volume, bounds=(0.0, 1.0), method="bounded").x)
         weight = min((0.0, found, 1.0), key=log_volume)
     return _weighed(a, b, weight * A, (1.0 - weight) * B, angles), weight

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.linalg import solve_discrete_are
 
 from estimators.core.errors import NotPositiveDefiniteError
 from estimators.core.information import bound, range_information
@@ -48,6 +47,8 @@ def steady(information: Array, Q: Array) -> Array:
     if not values[0] > 1e-12 * values[1]:
         raise NotPositiveDefiniteError("a direction is open: the bound grows for ever")
     H = np.sqrt(values)[:, None] * vectors.T  # F = H' H
+    from scipy.linalg import solve_discrete_are
+
     predicted = solve_discrete_are(np.eye(2), H.T, Q, np.eye(2))
     return np.linalg.inv(np.linalg.inv(predicted) + information)
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.optimize import minimize
 
 from estimators.core.errors import ParameterError
 from estimators.core.information import range_information, with_known_depth
@@ -101,6 +100,8 @@ def optimise_bearings(deviations: ArrayLike, Q: Array | None = None, *, seed: in
         return float(np.log(np.trace(steady(F, Q)))) - 100.0  # below any of the other
 
     rng = np.random.default_rng(seed)
+    from scipy.optimize import minimize
+
     found = [
         minimize(cost, rng.uniform(0.0, math.pi, n), method="BFGS", options={"gtol": 1e-10}) for _ in range(starts)
     ]

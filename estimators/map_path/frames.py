@@ -6,12 +6,15 @@ A body's axes are forward and starboard, bearings are positive to starboard, hea
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy import sparse
 
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array, Measurement
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 KIND = "sonar"  # of measurements that are frames
 EMPTY, SATURATED, WRONG_SIZE, NOT_FINITE = "empty", "saturated", "wrong_size", "not_finite"
@@ -127,8 +130,10 @@ def to_sector(intensity: Array, polar: PolarGrid, sector: SectorGrid) -> Array:
 
 
 @lru_cache(maxsize=8)
-def _resampling(polar: PolarGrid, sector: SectorGrid) -> sparse.csr_matrix:
+def _resampling(polar: PolarGrid, sector: SectorGrid) -> "sparse.csr_matrix":
     """Weights (cells, samples): bilinear in bearing and range, averaged over 4 x 4 points of each cell."""
+    from scipy import sparse
+
     bearings, ranges = np.array(polar.bearings), np.array(polar.ranges)
     cells = np.arange(sector.seen.size)[sector.seen.ravel()]
     points = 4

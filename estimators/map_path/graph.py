@@ -2,15 +2,16 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from estimators.core.errors import NotFiniteError, ParameterError
 from estimators.core.types import Array
 from estimators.map_path.poses import between, wrapped
+
+if TYPE_CHECKING:
+    from scipy import sparse
 
 
 class Edge(NamedTuple):
@@ -30,10 +31,12 @@ class GraphSolution:
     weights: Array  # (edges,) 1, and less where a robust loss doubts an edge
     cost: float  # half the weighted sum of squared normalised residuals
     iterations: int
-    information: sparse.csc_matrix  # (3 n, 3 n) with the prior of the first pose
+    information: "sparse.csc_matrix"  # (3 n, 3 n) with the prior of the first pose
 
     def covariance(self, index: int) -> Array:
         """Covariance (3, 3) of a pose given the whole graph."""
+        from scipy.sparse.linalg import splu
+
         place = index % len(self.poses) * 3
         unit = np.zeros((3 * len(self.poses), 3))
         unit[place : place + 3] = np.eye(3)
@@ -65,6 +68,9 @@ def optimise(
         ParameterError: An edge is of a pose that is not there, or of a pose with itself.
         NotFiniteError: It does not converge.
     """
+    from scipy.sparse import csc_matrix
+    from scipy.sparse.linalg import splu
+
     poses = np.array(guess, dtype=float)
     first, second = (np.array([e[k] for e in edges], dtype=int) for k in (0, 1))
     if len(edges) and not (min(first.min(), second.min()) >= 0 and max(first.max(), second.max()) < len(poses)):
@@ -89,7 +95,7 @@ def optimise(
             inverse, at = np.linalg.inv(covariance), slice(3 * index, 3 * index + 2)
             information[at, at] += inverse
             gradient[at] += inverse @ (poses[index, :2] - place)
-        information = sparse.csc_matrix(information)
+        information = csc_matrix(information)
         try:
             step = -splu(information).solve(gradient).reshape(-1, 3)
         except RuntimeError:  # singular, after poses have run away
@@ -120,6 +126,8 @@ def _residuals(poses: Array, first: np.ndarray, second: np.ndarray, measured: Ar
 
 def _jacobian(by_first: Array, by_second: Array, first: np.ndarray, second: np.ndarray, count: int):
     """The sparse Jacobian (3 e, 3 n)."""
+    from scipy.sparse import csr_matrix
+
     rows = 3 * np.arange(len(first))[:, None, None] + np.arange(3)[:, None]
     parts, columns = [], []
     for block, index in ((by_first, first), (by_second, second)):
@@ -127,4 +135,4 @@ def _jacobian(by_first: Array, by_second: Array, first: np.ndarray, second: np.n
         columns.append(np.broadcast_to(3 * index[:, None, None] + np.arange(3), block.shape).ravel())
     row = np.broadcast_to(rows, by_first.shape).ravel()
     data, place = np.concatenate(parts), (np.concatenate((row, row)), np.concatenate(columns))
-    return sparse.csr_matrix((data, place), shape=(3 * len(first), 3 * count))
+    return csr_matrix((data, place), shape=(3 * len(first), 3 * count))

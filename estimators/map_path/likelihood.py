@@ -11,7 +11,6 @@ from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
-from scipy.ndimage import spline_filter1d
 
 from estimators.core.errors import ParameterError
 from estimators.core.types import Array
@@ -118,6 +117,8 @@ class Matcher:
 
 def _upsampling(size: int) -> Array:
     """Matrix (5 size, size) of cubic spline interpolation with mirrored ends."""
+    from scipy.ndimage import spline_filter1d
+
     coefficients = spline_filter1d(np.eye(size), order=3, axis=0, mode="mirror")
     places = (np.arange(size * UPSAMPLING) + 0.5) / UPSAMPLING - 0.5
     matrix = np.zeros((places.size, size))
