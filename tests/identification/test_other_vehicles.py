@@ -12,7 +12,7 @@ import usv
 from auvsim import cli
 from auvsim.base.errors import InputError
 from auvsim.identification.motion import data, fit
-from auvsim.identification.motion.choice import Folds
+from auvsim.identification.motion.choice import LUCK, NEAR, Folds, choose
 from auvsim.identification.motion.identify import identify_motion
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
@@ -154,3 +154,22 @@ def test_few_stretches_count_by_what_they_are_worth() -> None:
     assert found.worth == pytest.approx(fit.ALIKE * motions[0].duration)
     alone = found.worth / np.diag(found.information)  # each variance if the others were known: the least that it can be
     assert (np.diag(fit.covariance(found)) > 0.99 * alone).all()
+
+
+def test_what_comes_near_is_averaged(logs: list[Path]) -> None:
+    """Of all that converged within twice the least error, by the inverse of mean squares; each predicts as it is."""
+    motions = data.prepare(read(logs[:2]).records, coarsest=data.QUICK)
+    found = choose(motions, STRUCTURES[2:4], quick=True)
+    assert found.chosen.step == fit.AVERAGE
+    singles = [c for c in found.candidates if c.step != fit.AVERAGE]
+    assert set(map(id, found.averaged)) == {
+        id(c) for c in singles if c.converged and c.error <= NEAR * found.alone.error
+    }  # fmt: skip
+    for fold in (-1, 0):
+        parts = [found.folds.fit(c.structure, c.step, fold).vector for c in found.averaged]
+        weights = np.array([1.0 / c.error**2 for c in found.averaged])
+        mean = found.folds.fit(found.chosen.structure, fit.AVERAGE, fold).vector
+        np.testing.assert_allclose(mean, weights @ parts / weights.sum(), rtol=1e-9, atol=1e-15)
+    assert found.mark(found.chosen) == "chosen"
+    assert found.mark(found.averaged[0]) == "averaged"
+    assert found.chosen.error <= (1.0 + LUCK) * found.alone.error

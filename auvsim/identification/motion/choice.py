@@ -27,7 +27,7 @@ from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS
 FOLDS = 4
 NEAR = 2.0  # times the least error, up to which candidates are averaged
 # By what share an average may be worse than the simplest good candidate: the best of twenty looks better than it is.
-LUCK = 0.1
+LUCK = 0.25
 KEPT = 4  # structures that go on to all steps
 EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
 # Records from which on whole ones are left out, and asymmetry may be chosen. Within a record it cannot be told from
