@@ -16,6 +16,8 @@ from auvsim.simulation.run import run as run_trial
 from auvsim.studies.comparison import CELLS, Options, run_one, run_study, score, table
 from estimators.core.consistency import interval
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 SEED = 9  # not among those used for tuning
 
 

@@ -10,11 +10,13 @@ from auvsim.base.errors import InputError
 from auvsim.studies import docking
 from auvsim.studies.docking import LATER, Options, Study, report, run_study, table
 
+pytestmark = pytest.mark.usefixtures("in_this_process")
+
 SEED = 7  # not among those used for tuning
 
 
 @pytest.fixture(scope="module")
-def study() -> Study:
+def study(in_this_process: None) -> Study:
     """Ten trials."""
     return run_study(10, SEED)
 
