@@ -366,7 +366,7 @@ def test_what_is_far_is_not_looked_at_again_before_it_can_be_near():
     """The same states bit for bit as of a world that looks at every step; near the dock and the floor it looks, too."""
     runs, looks = [], []
     for patient in (True, False):
-        world = build(heading=0.0)
+        world = build(sea_floor=400.0)
         world.put((-30.0, 0.1, DEPTH), 0.0, 1.5, 90.0)
         world.steer(0.0, 0.0, 90.0)
         look, count = world._is_near, [0]
