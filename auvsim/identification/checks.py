@@ -140,15 +140,25 @@ def _speeds_and_positions(one: Signals) -> None:
             legs = np.hypot(
                 np.diff(np.interp(times, north.times, north.values)), np.diff(np.interp(times, east.times, east.values))
             )
-            areas = np.cumsum(np.diff(log.times) * 0.5 * np.abs(log.values[1:] + log.values[:-1]))
-            run = np.diff(np.interp(times, log.times, np.concatenate([[0.0], areas])))
-            ratio = float(np.median(run / np.maximum(legs, 1e-3)))
-            _speed_unit(f"{one.name}: the log's speed is {ratio:.3g} times that of the positions", ratio, 1.1)
+            run = np.diff(_integrated(log.times, np.abs(log.values), times))
+            straight = np.ones(len(run), dtype=bool)
+            if (heading := one.signals.get("heading")) is not None:  # a turn's way is longer than from place to place
+                course = np.exp(1j * np.interp(log.times, heading.times, heading.values))
+                straight = np.abs(np.diff(_integrated(log.times, np.abs(log.values) * course, times))) > 0.9 * run
+            if straight.sum() >= 5:
+                ratio = float(np.median(run[straight] / np.maximum(legs[straight], 1e-3)))
+                _speed_unit(f"{one.name}: the log's speed is {ratio:.3g} times that of the positions", ratio, 1.1)
     if {"surge", "ground_surge"} <= one.signals.keys():
         ratio, sharp = _water_by_ground(one)
         _speed_unit(
             f"{one.name}: surge through the water is {ratio:.3g} times that over ground", ratio, 1.2 if sharp else 1.33
         )
+
+
+def _integrated(times: Array, values: Array, at: Array) -> Array:
+    """Integrals by the trapezoidal rule from the first of the times to each of others."""
+    areas = np.cumsum(np.diff(times) * 0.5 * (values[1:] + values[:-1]))
+    return np.interp(at, times, np.concatenate([[0.0], areas]))
 
 
 def _water_by_ground(one: Signals) -> tuple[float, bool]:

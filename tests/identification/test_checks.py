@@ -11,6 +11,7 @@ from auvsim import cli
 from auvsim.base.errors import InputError
 from auvsim.identification import checks
 from auvsim.identification.readers import read
+from auvsim.identification.signals import Signal, Signals
 
 Table = dict[str, np.ndarray]
 
@@ -111,3 +112,25 @@ def test_a_rudder_that_follows_the_yaw_rate_is_not_reversed(tmp_path: Path) -> N
     checks.records([record], TRUE)
     with pytest.raises(InputError, match="sign: -1"):
         checks.records(read([write(path, {**table, "rudder [deg]": -table["rudder [deg]"]})]).records, TRUE)
+
+
+@pytest.mark.parametrize("turn", [0.0, 2.0, 19.0])
+def test_a_circle_is_longer_than_from_place_to_place_and_knots_are_still_seen(turn: float) -> None:
+    """A log of metres a second whose places close a circle of 8 m is right; of knots it is refused where it can be."""
+    times = np.arange(0.0, 150.0, 0.1)
+    heading, speed = np.radians(turn) * times, np.full(times.shape, 1.4)
+    ways = np.cumsum(0.14 * np.exp(1j * heading))
+    every_4 = slice(0, None, 40)  # places are rarer than the log's speeds
+    places = {"north": ways.real[every_4], "east": ways.imag[every_4]}
+
+    def given(factor: float) -> Signals:
+        fast = {"heading": heading, "ground_surge": factor * speed}
+        found = {name: Signal(times=times, values=values) for name, values in fast.items()}
+        return Signals(
+            name="log", signals=found | {n: Signal(times=times[every_4], values=v) for n, v in places.items()}
+        )
+
+    checks._speeds_and_positions(given(1.0))
+    if turn < 10.0:
+        with pytest.raises(InputError, match=r"1\.9\d times that of the positions: is it in kn"):
+            checks._speeds_and_positions(given(3600.0 / 1852.0))

@@ -16,7 +16,7 @@ from auvsim.physics.planar_fit import fit_planar_model
 from auvsim.physics.planar_sets import PlanarSet, Source, coefficients
 from auvsim.simulation import sampling, scenario
 from auvsim.simulation.run import Simulation
-from auvsim.vehicles import library
+from auvsim.vehicles import model_files
 from estimators.planar.model import PARAMETER_NAMES, PRESTERO, PlanarParameters
 
 
@@ -105,7 +105,7 @@ def test_a_wrong_file_is_refused_in_one_line(tmp_path: Path, change: tuple[str, 
 
 def test_names_are_found_beside_the_vehicle(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A shipped vehicle's sets by name; an error lists those that exist; another vehicle's set is refused."""
-    monkeypatch.setattr(library, "models_folder", lambda: tmp_path)
+    monkeypatch.setattr(model_files, "models_folder", lambda: tmp_path)
     home = planar_sets.folder("remus100")
     home.mkdir(parents=True)
     planar_sets.write(some_set(), home / "lake.yaml")
