@@ -16,6 +16,7 @@ PRINTED = {  # what shows that a notebook came to its point
     "03_identification": ["these are degrees", "below 2 %: True; better than its start: True", "lake.yaml  docked"],
     "04_cooperative": ["twenty times worse in silence: True", "m longer: True"],
     "05_formations": ["[  0.  60. 120.] degrees", "worse, and claims to be better: True"],
+    "06_bayes_navigation": ["below a tenth of dead reckoning: True"],
     "07_campaign": ["8 trials, then 12", "the same to the last bit: True"],
 }
 
