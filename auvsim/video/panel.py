@@ -104,7 +104,7 @@ def _fleet(on: Panel, playback: Playback, moment: Moment, speed: float) -> None:
     for (name, value), x, indent in zip(values, (16, 150, 270), (36, 48, 54), strict=True):
         on.put(name, x, 55, small)
         on.put(value, x + indent, 55, Style(15, WHITE, bold=True))
-    for text, x in (("phase", 104), ("to dock", 232), ("estimate off by", 308)):
+    for text, x in (("phase", 104), ("to dock" if playback.docks else "depth", 232), ("estimate off by", 308)):
         on.put(text, x, 80, small)
     names = list(playback.motions)
     shown = names if len(names) <= ROWS else names[: ROWS - 1]
@@ -114,7 +114,8 @@ def _fleet(on: Panel, playback: Playback, moment: Moment, speed: float) -> None:
         on.put(shortened(name, style, 82), 16, y, style)
         on.block(104, y - 15, 118, 20, phase_colour(motion.phase_names, now.phase))
         on.put(shortened(_phase(motion, now), Style(14), 106), 110, y, Style(14, WHITE, bold=True))
-        on.put("" if math.isnan(now.range) else _range(now), 232, y, Style(14))
+        place = f"{-now.position[2]:.1f} m" if not playback.docks else "" if math.isnan(now.range) else _range(now)
+        on.put(place, 232, y, Style(14))
         on.put(error(now), 308, y, Style(14))
     if len(shown) < len(names):
         on.put(f"and {len(names) - len(shown)} more", 16, 102 + 24 * len(shown), Style(13, GREY))
@@ -152,11 +153,10 @@ def _legend(on: Panel, playback: Playback, moment: Moment) -> None:
         ("estimate, 2σ", [marks.ESTIMATE], 14),
         *((("dock and axis", [marks.DOCK], 14),) if playback.docks or not playback.talks else ()),
         *((("heard, lost", [HEARD, LOST], 14),) if playback.talks and not playback.docks else ()),
-        ("fix", [marks.FIX], 7),
-        (refused, [marks.REFUSED], 7),
+        *((("fix", [marks.FIX], 7), (refused, [marks.REFUSED], 7)) if playback.hears_fixes else ()),
         ("current", [marks.CURRENT], 14),
     )
-    for (text, colours, width), (row, column) in zip(entries, np.ndindex(2, 3), strict=True):
+    for (text, colours, width), (row, column) in zip(entries, np.ndindex(2, 3), strict=False):
         x, y, height = 16 + 134 * column, 206 + 26 * row, 7 if width == 7 else 4
         piece = width / len(colours)
         for index, colour in enumerate(colours):

@@ -77,6 +77,7 @@ class Playback:
         found = [motion.received_fixes() for motion in self.motions.values()]
         told = [(float(t), str(r)) for fixes in found for t, r in zip(fixes.times, fixes.reasons, strict=True) if r]
         self._refusals = sorted(told)
+        self.hears_fixes = any(len(fixes.times) for fixes in found)
         self._joints = {name: self._addresses(name) for name in self.motions}
 
     def _addresses(self, name: str) -> tuple[int, list[int], list[int], Array]:
