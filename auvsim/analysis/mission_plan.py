@@ -17,7 +17,8 @@ from auvsim.missions.track.mission import Track
 from auvsim.navigation.estimate import Estimate
 from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.range import RangeSettings
-from auvsim.simulation.scenario import Scenario, VehicleSettings
+from auvsim.simulation.scenario import Scenario
+from auvsim.simulation.scenario_settings import VehicleSettings
 from auvsim.simulation.sensor_settings import on_board
 from auvsim.vehicles import library
 from auvsim.water.currents import CurrentField

@@ -9,7 +9,8 @@ from typing import Any, get_type_hints
 from auvsim.base import schema, yaml_text
 from auvsim.base.errors import DOTTED, InputError
 from auvsim.simulation import loading, sampling, short
-from auvsim.simulation.scenario import Scenario, Start, parse
+from auvsim.simulation.scenario import Scenario, parse
+from auvsim.simulation.scenario_settings import Start
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.simulation.short import ShortScenario
 

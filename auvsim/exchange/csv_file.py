@@ -14,7 +14,7 @@ from auvsim.data.log import Log, VehicleLog
 from auvsim.identification import log_records
 from auvsim.identification.signals import Signal
 from auvsim.simulation import scenario
-from auvsim.simulation.scenario import VehicleSettings
+from auvsim.simulation.scenario_settings import VehicleSettings
 from auvsim.vehicles import library, model_files
 
 _DVL = {"ground_surge [m/s]": 0, "ground_sway [m/s]": 1, "surge [m/s]": 3, "sway [m/s]": 4}

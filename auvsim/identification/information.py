@@ -14,7 +14,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
 from auvsim.identification import compiled
 from auvsim.identification.fit import DEFAULT_FREE, Nuisances, free_indices
-from auvsim.simulation.scenario import SensorSettings
+from auvsim.simulation.sensor_settings import SensorSettings
 from estimators.core.compiling import is_ready
 from estimators.planar.model import PlanarParameters
 

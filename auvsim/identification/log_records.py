@@ -12,7 +12,7 @@ from auvsim.identification.signals import MARGIN, Signal, Signals, steep, stretc
 from auvsim.missions.manoeuvres import laws as manoeuvres
 from auvsim.missions.manoeuvres.settings import ManoeuvreMissionSettings
 from auvsim.simulation import scenario
-from auvsim.simulation.scenario import VehicleSettings
+from auvsim.simulation.scenario_settings import VehicleSettings
 from auvsim.vehicles import library, model_files
 from auvsim.vehicles.actuation import FinsAndShaft
 from estimators.core.types import Array

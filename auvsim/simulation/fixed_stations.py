@@ -8,7 +8,7 @@ from numpy.random import Generator
 from auvsim.acoustics.modems import Equipment
 from auvsim.acoustics.payload import StateReport
 from auvsim.base.frames import rotation
-from auvsim.simulation.scenario import FixedModem
+from auvsim.simulation.scenario_settings import FixedModem
 
 
 class FixedStation:

@@ -21,15 +21,8 @@ from auvsim.missions.registry import MissionSettings
 from auvsim.navigation.settings import EstimatorSettings, RobustSettings
 from auvsim.physics.ballast import BallastSettings
 from auvsim.physics.scenes import WorldSettings
-from auvsim.simulation.scenario import (
-    DatumSettings,
-    RandomSettings,
-    Rates,
-    Scenario,
-    Start,
-    StructureSettings,
-    validated,
-)
+from auvsim.simulation.scenario import Scenario, validated
+from auvsim.simulation.scenario_settings import DatumSettings, RandomSettings, Rates, Start, StructureSettings
 from auvsim.simulation.sensor_settings import SensorSettings
 from auvsim.vehicles import model_files
 from auvsim.water.settings import CurrentSettings, UniformSettings

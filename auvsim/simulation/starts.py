@@ -11,7 +11,8 @@ from auvsim.base.frames import Array
 from auvsim.missions.formation.settings import FormationSettings
 from auvsim.missions.mission import Place
 from auvsim.missions.track.mission import TrackSettings
-from auvsim.simulation.scenario import Scenario, check_depths
+from auvsim.simulation.depths import check_depths
+from auvsim.simulation.scenario import Scenario
 
 ALONG = np.linspace(0.0, 1.0, 41)  # places along a dock's axis, from its mouth to its end, as shares of its length
 

@@ -14,7 +14,7 @@ from auvsim.base.randomness import stream
 from auvsim.campaign import plan as plans
 from auvsim.campaign.plan import Plan
 from auvsim.simulation import controllers, sampling, scenario
-from auvsim.simulation.scenario import RandomSettings
+from auvsim.simulation.scenario_settings import RandomSettings
 from auvsim.stress.settings import FactorSettings, StressSettings
 
 Steps = tuple[tuple[int, float], ...]  # of a walk: trial and angle [deg]

@@ -15,7 +15,7 @@ from auvsim.identification.information import STEP, Experiment, Progressed
 from auvsim.missions.manoeuvres.laws import Steering
 from auvsim.missions.manoeuvres.settings import OptimalSettings
 from auvsim.physics.planar_fit import fit_planar_model
-from auvsim.simulation.scenario import SensorSettings
+from auvsim.simulation.sensor_settings import SensorSettings
 from estimators.planar.model import PARAMETER_NAMES, accelerations
 
 DEG = math.pi / 180.0

@@ -11,7 +11,8 @@ from auvsim.base import schema, yaml_text
 from auvsim.base.errors import InputError
 from auvsim.base.frames import rotation
 from auvsim.simulation.sampling import default_plan, draw, merge
-from auvsim.simulation.scenario import Rates, Scenario, from_yaml, parse, to_yaml
+from auvsim.simulation.scenario import Scenario, from_yaml, parse, to_yaml
+from auvsim.simulation.scenario_settings import Rates
 from auvsim.simulation.sensor_settings import on_board
 from auvsim.simulation.short import ShortScenario
 

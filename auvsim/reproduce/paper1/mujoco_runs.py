@@ -31,7 +31,8 @@ from auvsim.sensors.compass import Compass
 from auvsim.simulation.building import build_world
 from auvsim.simulation.planar_world import PlanarWorld, planar_state
 from auvsim.simulation.run import Simulation
-from auvsim.simulation.scenario import Rates, Scenario, StructureSettings, VehicleSettings
+from auvsim.simulation.scenario import Scenario
+from auvsim.simulation.scenario_settings import Rates, StructureSettings, VehicleSettings
 from auvsim.simulation.sensor_settings import SensorSettings, rated
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
