@@ -82,14 +82,17 @@ def chart(found: EnvelopeMap, searches: Searches) -> Figure:
         if len(cells) <= LABELLED:
             low, high = cell.interval
             text = f"{100 * cell.rate:.0f}\n{100 * low:.0f}-{100 * high:.0f}"
-            axes.text(x + w / 2, y + h / 2, text, ha="center", va="center", fontsize=5.0 + 14.0 * cell.size)
+            ink = "black" if 0.15 < cell.rate < 0.85 else "white"  # the scale is dark at both ends
+            axes.text(x + w / 2, y + h / 2, text, color=ink, ha="center", va="center", fontsize=6.0 + 14.0 * cell.size)
     axes.set_xlim(min(across.range), max(across.range))
     axes.set_ylim(min(upward.range), max(upward.range))
     axes.set_xlabel(found.names[0])
     axes.set_ylabel(found.names[1])
     from matplotlib.cm import ScalarMappable
 
-    figure.colorbar(ScalarMappable(norm, colours), ax=axes, label="success rate")
+    figure.colorbar(
+        ScalarMappable(norm, colours), ax=axes, label="success rate [-]; in the cells with its 95 % interval [%]"
+    )
     return figure
 
 
