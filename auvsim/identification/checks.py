@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from auvsim.base.errors import InputError
 from auvsim.identification import velocity_checks
@@ -107,8 +108,7 @@ def _heading_and_gyro(one: Signals) -> None:
     if len(times) < 5:
         return
     turned = np.diff(np.interp(times, heading.times, heading.values))
-    areas = np.concatenate([[0.0], np.cumsum(np.diff(gyro.times) * 0.5 * (gyro.values[1:] + gyro.values[:-1]))])
-    integrated = np.diff(np.interp(times, gyro.times, areas))
+    integrated = np.diff(_integrated(gyro.times, gyro.values, times))
     # What is common to both, by the larger of the two regressions: noise on either makes one too small.
     product = float(turned @ integrated)
     correlation = product / math.sqrt(float(turned @ turned) * float(integrated @ integrated) + 1e-300)
@@ -157,8 +157,7 @@ def _speeds_and_positions(one: Signals) -> None:
 
 def _integrated(times: Array, values: Array, at: Array) -> Array:
     """Integrals by the trapezoidal rule from the first of the times to each of others."""
-    areas = np.cumsum(np.diff(times) * 0.5 * (values[1:] + values[:-1]))
-    return np.interp(at, times, np.concatenate([[0.0], areas]))
+    return np.interp(at, times, cumulative_trapezoid(values, times, initial=0.0))
 
 
 def _water_by_ground(one: Signals) -> tuple[float, bool]:

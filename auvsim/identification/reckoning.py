@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from estimators.core.types import Array
 
@@ -46,7 +47,7 @@ def reckoned(signals: Mapping[str, tuple[Array, Array]], times: Array) -> NDArra
     ahead = np.interp(clock, *signals[forward]) if forward in signals else np.ones(len(clock))
     aside = np.interp(clock, *signals[starboard]) if starboard in signals else np.zeros(len(clock))
     velocity = (ahead + 1j * aside) * np.exp(1j * heading)
-    way = np.concatenate([[0.0], np.cumsum(np.diff(clock) * 0.5 * (velocity[1:] + velocity[:-1]))])
+    way = cumulative_trapezoid(velocity, clock, initial=0.0)
     return np.interp(times, clock, way.real) + 1j * np.interp(times, clock, way.imag)
 
 

@@ -69,7 +69,7 @@ class Options:
 
 
 class Found(NamedTuple):
-    """What a run came to, over the times that the bound counts."""
+    """Error and consistency of a run, over the times that the bound counts."""
 
     square: float  # mean squared error of the position [m2]
     nees: float  # mean of it, per degree of freedom

@@ -190,13 +190,14 @@ class InteractingModelFilter:
             enough = self._recovery.suffice(now, own, agreeing, settled)
             lasts = bool(own) and fix.stamp - own[0].measurement.stamp >= self._echo
             if enough or (is_wrong and self._recovery.forces and len(own) >= REMEMBERED and lasts):
+                before = state.belief
                 if enough:
                     earlier = _apart(now, agreeing) if self._echo else agreeing[0]
-                    corrected = self._recovery.recover(state.belief, earlier, now, model)
+                    corrected = self._recovery.recover(before, earlier, now, model)
                 else:
-                    corrected = ekf.correct(opened(state.belief, now.H, now.residual), fix, model)[0]
+                    corrected = ekf.correct(opened(before, now.H, now.residual), fix, model)[0]
                 doubt = (DOUBT if settled else 0.0) if enough else EVEN
-                both = imm.merge((corrected, state.belief), np.array((1.0 - doubt, doubt)), self._angles)
+                both = imm.merge((corrected, before), np.array((1.0 - doubt, doubt)), self._angles)
                 means, covariances = imm.stacked((both,) * len(modes))
                 verdicts = (*state.verdicts, (fix, "", innovation.nis))
                 if enough and self._recovery.fuses_both:

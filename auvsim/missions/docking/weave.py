@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from auvsim.base.frames import Array
-from auvsim.missions.docking.speeds import ground_speed_along
+from auvsim.missions.docking.speeds import SLOWEST, ground_speed_along
 from auvsim.missions.fixes import FixSource
 from auvsim.navigation.estimate import COMPASS_BIAS, Estimate
 from estimators.core.models.odometry import SPACE, N
@@ -24,7 +24,6 @@ STEPS = 10  # amplitudes that are tried, up to the largest
 SHORTEST = 60.0  # way on which it is worth to weave [m]
 GAINED = 0.9  # deviation over that of a straight line from which a weave that does not suffice is flown all the same
 PIECE = 2.0  # of the planned way [m]
-CREEP = 0.1  # speed over ground by which it is planned at least [m/s]
 CURRENT_WALK = 1e-6  # density of the current's random walk, as in the estimators' steady modes [m^2/s^3]
 STEEPEST = 0.8  # slope to the line at most [-]
 PEAK = 4.0 / (3.0 * math.sqrt(3.0))  # of sin(2 t) sin(t)
@@ -159,5 +158,5 @@ def _way(leg: Leg, weave: Weave) -> tuple[Array, Array]:
     places = np.column_stack((leg.mouth[0] + along * cos - offset * sin, leg.mouth[1] + along * sin + offset * cos))
     pieces = np.linalg.norm(np.diff(places, axis=0), axis=1)
     courses = leg.line + np.arctan(0.5 * (slope[1:] + slope[:-1]))
-    speeds = [max(ground_speed_along(course, leg.speed, leg.current), CREEP) for course in courses.tolist()]
+    speeds = [max(ground_speed_along(course, leg.speed, leg.current), SLOWEST) for course in courses.tolist()]
     return np.concatenate(([0.0], np.cumsum(pieces / np.array(speeds)))), places
