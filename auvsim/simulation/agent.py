@@ -23,6 +23,7 @@ from auvsim.navigation.gate import Gate
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.navigator import Navigator
+from auvsim.navigation.state_report import state_report
 from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth
 from auvsim.sensors import registry as sensors
@@ -30,6 +31,7 @@ from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.sensors.sensor import Surroundings
 from auvsim.simulation import parts
+from auvsim.simulation.gate_events import gate_events
 from auvsim.simulation.parts import Part
 from auvsim.simulation.scenario import Scenario
 from auvsim.simulation.sensor_settings import on_board
@@ -194,17 +196,12 @@ class Agent:
                     parts.reading(reading, sensor)
                 log.reading(self.name, reading)
                 taken.append(reading)
-        suspect = dict(self.gate.refused)
+        suspects = set(self.gate.refused)
         self._readings, refused = self.gate.passed(taken)
         self._gated += refused
-        for outcome in refused:
-            if outcome.kind not in suspect:
-                text = f"readings of {outcome.kind}: {outcome.reason.replace('_', ' ')}"
-                log.event(truth.time, self.name, "refused", text)
-        for reading in self._readings if suspect else ():
-            if (count := self.gate.refused.pop(reading.sensor, 0)) > 0:
-                text = f"{reading.sensor} is heard again; {count} reading{'s' * (count > 1)} refused"
-                log.event(truth.time, self.name, "heard", text)
+        heard = (reading.sensor for reading in self._readings)
+        for kind, text in gate_events("reading", self.gate.refused, suspects, refused, heard):
+            log.event(truth.time, self.name, kind, text)
 
     def receive(self, deliveries: Sequence[Delivery], time: float, log: Log) -> None:
         """Takes what the network delivers now; a fix of the dock's USBL is a reading, too."""
@@ -218,40 +215,20 @@ class Agent:
                 heard.append(delivery)
         if not heard or self.messages is None:
             return
-        suspect = dict(self.messages.refused)
+        suspects = set(self.messages.refused)
         good, refused = self.messages.passed(heard)
         self._messages += good
         self._gated += refused
-        for outcome in refused:
-            if outcome.source not in suspect:
-                text = f"messages of {outcome.source}: {outcome.reason.replace('_', ' ')}"
-                log.event(time, self.name, "refused", text)
-        for delivery in good if suspect else ():
-            if (count := self.messages.refused.pop(delivery.message.source, 0)) > 0:
-                text = f"{delivery.message.source} is heard again; {count} message{'s' * (count > 1)} refused"
-                log.event(time, self.name, "heard", text)
+        sources = (delivery.message.source for delivery in good)
+        for kind, text in gate_events("message", self.messages.refused, suspects, refused, sources):
+            log.event(time, self.name, kind, text)
 
     def report(self, time: float, stamp: float) -> StateReport | None:
         """What the vehicle tells others: its estimate, moved on to a time [s] and stamped; None before there is one."""
         e = self.estimate
         if e is None or not e.initialised:
             return None
-        dt = time - e.time
-        surge, sway, yaw_rate = e.velocity.tolist()
-        cos, sin = math.cos(e.heading), math.sin(e.heading)
-        north = surge * cos - sway * sin + float(e.current[0])
-        east = surge * sin + sway * cos + float(e.current[1])
-        own = [*self.navigator.states]
-        index = [0, 1, own.index("heading")] if "heading" in own else [0, 1]
-        P = [[0.0] * 3 for _ in range(3)]
-        for row, i in enumerate(index):
-            for column, j in enumerate(index):
-                P[row][column] = float(e.covariance[i, j])
-        position = e.position.tolist()
-        return StateReport(
-            stamp, position[0] + north * dt, position[1] + east * dt, position[2], e.heading + yaw_rate * dt,
-            north, east, yaw_rate, P[0][0], P[0][1], P[0][2], P[1][1], P[1][2], P[2][2],
-        )  # fmt: skip
+        return state_report(e, [*self.navigator.states], time, stamp)
 
     def outgoing(self) -> list[Outgoing]:
         """Takes what the mission wants to send."""

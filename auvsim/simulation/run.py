@@ -9,12 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.random import Generator
 
-from auvsim.acoustics.channel import DELIVERED
-from auvsim.acoustics.link import Channel
 from auvsim.acoustics.message import Fate, Outgoing
-from auvsim.acoustics.modems import Equipment, Modems, build_modems
-from auvsim.acoustics.network import Network
-from auvsim.acoustics.usbl import Usbl
 from auvsim.base.errors import DivergenceError
 from auvsim.base.frames import Array
 from auvsim.base.garbage import frozen_garbage
@@ -34,11 +29,11 @@ from auvsim.simulation.building import (
     structure_model,
     vehicle_model,
 )
-from auvsim.simulation.fixed_stations import FixedStation
+from auvsim.simulation.network_building import build_network
 from auvsim.simulation.parts import PartError
 from auvsim.simulation.recording import Unrecorded, recorder
+from auvsim.simulation.reports import Reports
 from auvsim.simulation.scenario import Scenario
-from auvsim.simulation.stretches import Stretches
 from auvsim.water.currents import listeners
 
 
@@ -156,17 +151,12 @@ class Simulation:
             own = {"navigator": (navigators or {}).get(name), "mission": (missions or {}).get(name)}
             with naming_part(name):
                 self.agents.append(agents(name, scenario, model, self._places, noise(name), **own))
-        self._usbl = [self._service(agent, noise(agent.name)) for agent in self.agents if agent.serves]
-        links = {
-            usbl.vehicle: Channel(scenario.network.acoustics, noise(usbl.vehicle)("acoustics")) for usbl in self._usbl
-        }
-        self.network = Network(links, self._usbl, self._modems(drawn))
-        self._fates: dict[tuple[str, str], str] = {}  # the last one, by sender and receiver
+        named = {agent.name: agent for agent in self.agents}
+        self.network, self._usbl = build_network(scenario, self.world, named, drawn)
         self._physics_ticks = round(rates.physics / rates.control)
         self._log_ticks = max(1, round(rates.control / rates.log))
         self.progress_ticks = round(6.0 * rates.control)
         self._listeners = listeners(self.world.current)
-        self._stretches = Stretches()
         self.ticks = 0
         self.truths: dict[str, Truth] = {}
         for name, settings in scenario.vehicles.items():
@@ -177,6 +167,7 @@ class Simulation:
         self.log: Any = Unrecorded()
         if record:
             self.log = recorder(scenario, self.agents, self._places, self._usbl, seed=seed, trial=trial, path=path)
+        self._reports = Reports(self.log, self.truths)
         self._record_truths()
 
     @property
@@ -214,7 +205,7 @@ class Simulation:
         self.ticks += 1
         before, self.truths = self.truths, {agent.name: world.truth(agent.name) for agent in self.agents}
         time = world.time
-        self._report_limits(time)
+        self._reports.limits(world, self.truths, time - 1.0 / self.scenario.rates.control)
         agent: Any = None
         try:
             for agent in self.agents:
@@ -225,11 +216,11 @@ class Simulation:
             log.reading(
                 fate.destination, ping.reading._replace(received=fate.received), fate.fate != "delivered", ping.outlier
             )
-            self._log_fate(fate)
+            self._reports.packet(fate)
         if self.network.modems:
             for fate in self.network.modems.advance(before, self.truths):
-                self._log_fate(fate)
-                self._report_loss(fate, time)
+                self._reports.packet(fate)
+                self._reports.loss(fate, time)
         try:
             for agent in self.agents:
                 agent.receive(self.network.deliver(agent.name, time), time, log)
@@ -249,59 +240,17 @@ class Simulation:
     def log_under_way(self) -> None:
         """Logs the packets that are still under way."""
         for fate in self.network.modems.under_way() if self.network.modems else ():
-            self._log_fate(fate)
-
-    def _modems(self, noise: Callable[[str], Generator]) -> Modems | None:
-        """The modems of vehicles, structures and beacons."""
-        plan, agents = self.scenario, {agent.name: agent for agent in self.agents}
-        equipment = {name: Equipment(v.modem, v.clock) for name, v in plan.vehicles.items() if v.modem}
-        fixed = {name: FixedStation(found, noise(f"{name}/chart")) for name, found in plan.fixed_modems.items()}
-        equipment |= {name: station.equipment for name, station in fixed.items()}
-        if not equipment:
-            return None
-        medium = plan.network.medium(getattr(self.world, "terrain", plan.world.floor).depth, plan.water.sea_floor)
-
-        def report(name: str, time: float, stamp: float) -> Any:
-            return fixed[name].report(stamp) if name in fixed else agents[name].report(time, stamp)
-
-        return build_modems(plan.network, equipment, medium, noise, report, 1.0 / plan.rates.control)
+            self._reports.packet(fate)
 
     def _post(self, name: str, outgoing: Outgoing, time: float) -> None:
         fate: Fate | None = None
         if self.network.modems:
             fate = self.network.modems.post(name, outgoing)
-        elif not self._stretches.begins(time, name, "mute"):
-            return
         else:
-            self.log.event(time, name, "mute", "the mission wants to send, but the vehicle has no modem")
+            self._reports.mute(time, name)
         if fate is not None:
-            self._log_fate(fate._replace(message=fate.message._replace(sent=time)))
-            self._report_loss(fate, time)
-
-    def _log_fate(self, fate: Fate) -> None:
-        m = fate.message
-        row = (m.sent, fate.received, m.source, fate.destination, m.kind, m.bits, fate.fate)
-        self.log.append("network/messages", row)
-
-    def _report_loss(self, fate: Fate, time: float) -> None:
-        """Logs where a receiver begins to lose the packets of a sender for a reason."""
-        link = (fate.message.source, fate.destination)
-        before, self._fates[link] = self._fates.get(link), fate.fate
-        if fate.fate not in (DELIVERED, before) and fate.destination in self.truths:  # which docks and beacons are not
-            self.log.event(time, fate.destination, "lost", f"packet of {link[0]}: {fate.fate}")
-
-    def _report_limits(self, time: float) -> None:
-        """Logs vehicles that come out of the water or touch the sea floor."""
-        world, before = self.world, time - 1.0 / self.scenario.rates.control
-        for name in self.truths:
-            if world.surfaced(name):
-                self._report_limit(time, name, "surfaced", "part of the hull is out of the water")
-            if world.grounded(name, before):
-                self._report_limit(time, name, "grounded", "touches the sea floor")
-
-    def _report_limit(self, time: float, name: str, kind: str, what: str) -> None:
-        if self._stretches.begins(time, name, kind):
-            self.log.event(time, name, kind, f"{what}, depth {float(self.truths[name].position[2]):.2f} m")
+            self._reports.packet(fate._replace(message=fate.message._replace(sent=time)))
+            self._reports.loss(fate, time)
 
     def progress(self) -> ProgressState:
         """Progress of the run."""
@@ -334,18 +283,3 @@ class Simulation:
             away = self.truths[agent.name].position[:2] - dock.pose.position[:2]
             for listener in self._listeners:
                 listener.approach(attempt, float(np.hypot(*away)), self.time)
-
-    def _service(self, agent: Agent, noise: Callable[[str], Generator]) -> Usbl:
-        """The USBL of the dock that serves a vehicle."""
-        assert agent.dock is not None
-        settings = self.scenario.vehicles[agent.name].sensors.usbl
-        state = self.world.structures.get(agent.dock)
-        return Usbl(
-            settings,
-            noise("usbl"),
-            self.scenario.structures[agent.dock].pose,
-            vehicle=agent.name,
-            structure=agent.dock,
-            clock_offset=self.scenario.network.acoustics.clock_offset,
-            occupant=lambda: state.latched if state else None,
-        )
