@@ -8,8 +8,9 @@ import numpy as np
 from auvsim.base.datum import Datum
 from auvsim.base.frames import Array, euler_to_quaternion, flip, rotation
 from auvsim.data.log import VehicleLog
-from auvsim.exchange.ros_messages import MAP, UNKNOWN, Ros, Rows
+from auvsim.exchange.ros_messages import MAP, Ros, Rows
 from auvsim.ros.frames import enu, enu_quaternion
+from auvsim.ros.types import UNKNOWN
 
 _PLANAR = ("north", "east", "heading", "surge", "sway", "yaw_rate", "current_north", "current_east")
 

@@ -10,9 +10,9 @@ from auvsim.base.datum import Datum
 from auvsim.base.frames import Array, euler_to_quaternion
 from auvsim.ros import types
 from auvsim.ros.frames import enu, enu_quaternion
+from auvsim.ros.types import UNKNOWN
 
 MAP = "map"
-UNKNOWN = 1e6  # variance of what is not estimated
 Rows = Iterator[tuple[float, float, Any]]  # stamp [s], when recorded [s], message
 
 

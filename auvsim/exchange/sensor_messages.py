@@ -12,12 +12,13 @@ import numpy as np
 from auvsim.base.datum import Datum
 from auvsim.base.frames import Array, euler_to_quaternion, flip, rotation
 from auvsim.data.log import VehicleLog
-from auvsim.exchange.ros_messages import UNKNOWN, Ros, Rows, Stream
+from auvsim.exchange.ros_messages import Ros, Rows, Stream
 from auvsim.identification import log_records
 from auvsim.identification.signals import Signal
 from auvsim.physics.scenes import GRAVITY
 from auvsim.ros import types
 from auvsim.ros.frames import enu_quaternion
+from auvsim.ros.types import UNKNOWN
 from auvsim.simulation.scenario import Scenario
 from auvsim.vehicles import library, model_files
 

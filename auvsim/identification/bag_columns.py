@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array, quaternion_to_euler
+from auvsim.identification import bag_deviations
+from auvsim.identification.bag_deviations import is_ned
 from auvsim.identification.columns import NAMESPACE, QUANTITIES, UNITS, ColumnSettings, quantity_of
 from auvsim.identification.table_text import Column
 from auvsim.ros import bags, types
@@ -133,7 +135,7 @@ def _columns(
     described: list[str],
 ) -> tuple[dict[str, Column], list[str]]:  # fmt: skip
     """The columns that the settings name, and of their times; the settings get the names of these."""
-    raw: dict[str, tuple[Array, str | None, str]] = {}
+    raw: dict[str, tuple[Array, str | None, str, float | None]] = {}
     clocks, notes = {}, []
     for quantity, given in settings.items():
         if not given.column:
@@ -149,6 +151,7 @@ def _columns(
             derived[name][field] if own else topic.fields[field],
             next(iter(UNITS[QUANTITIES[quantity].kind])) if own else None,
             clock,
+            bag_deviations.deviations(topic).get(quantity) if own else None,
         )
         settings[quantity] = given.model_copy(update={"time": clock})
     if not clocks:
@@ -158,7 +161,10 @@ def _columns(
     seconds = {clock: 1e-9 * (times - first).astype(float) for clock, times in clocks.items()}
     columns = {clock: Column(values=values, unit="s") for clock, values in seconds.items()}
     columns[_ROWS] = Column(values=np.unique(np.concatenate([*seconds.values()])), unit="s")
-    columns |= {name: Column(values=values, unit=unit, time=clock) for name, (values, unit, clock) in raw.items()}
+    columns |= {
+        name: Column(values=values, unit=unit, time=clock, deviation=deviation)
+        for name, (values, unit, clock, deviation) in raw.items()
+    }
     return columns, notes
 
 
@@ -206,16 +212,12 @@ def _xyz(topic: Topic, path: str) -> Array:
     return np.stack([topic.fields[f"{path}.{axis}"] for axis in "xyz"], axis=-1)
 
 
-def _is_ned(topic: Topic) -> bool:
-    return "ned" in topic.frame.lower().replace("/", "_").split("_")
-
-
 def _attitude(topic: Topic, path: str) -> Iterator[tuple[str, Array]]:
     """Heading and pitch; nothing where the quaternion is empty."""
     q = np.stack([topic.fields[f"{path}.{axis}"] for axis in "wxyz"], axis=-1)
     if not (np.abs(np.linalg.norm(q, axis=-1) - 1.0) < 0.1).all():
         return
-    _, pitch, heading = np.moveaxis(quaternion_to_euler(q if _is_ned(topic) else enu_quaternion(q)), -1, 0)
+    _, pitch, heading = np.moveaxis(quaternion_to_euler(q if is_ned(topic) else enu_quaternion(q)), -1, 0)
     yield from (("heading", heading), ("pitch", pitch))
 
 
@@ -223,13 +225,13 @@ def _imu(topic: Topic) -> Iterator[tuple[str, Array]]:
     if (topic.fields["orientation_covariance[0]"] != -1.0).all():
         yield from _attitude(topic, "orientation")
     if (topic.fields["angular_velocity_covariance[0]"] != -1.0).all():
-        yield "yaw_rate", topic.fields["angular_velocity.z"] * (1.0 if _is_ned(topic) else -1.0)
+        yield "yaw_rate", topic.fields["angular_velocity.z"] * (1.0 if is_ned(topic) else -1.0)
 
 
 def _place(path: str) -> Callable[[Topic], Iterator[tuple[str, Array]]]:
     def found(topic: Topic) -> Iterator[tuple[str, Array]]:
         place = _xyz(topic, path)
-        north, east, _ = np.moveaxis(place if _is_ned(topic) else enu(place), -1, 0)
+        north, east, _ = np.moveaxis(place if is_ned(topic) else enu(place), -1, 0)
         yield from (("north", north), ("east", east))
 
     return found
@@ -243,7 +245,7 @@ def _odometry(topic: Topic) -> Iterator[tuple[str, Array]]:
 
 def _twist(path: str, over: tuple[str, ...]) -> Callable[[Topic], Iterator[tuple[str, Array]]]:
     def found(topic: Topic) -> Iterator[tuple[str, Array]]:
-        side = 1.0 if _is_ned(topic) else -1.0
+        side = 1.0 if is_ned(topic) else -1.0
         for name in over:
             before = "ground_" if name == "ground" else ""
             yield f"{before}surge", topic.fields[f"{path}.linear.x"]

@@ -1,5 +1,6 @@
 """Latitudes and longitudes in degrees, however they are written."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +12,7 @@ from auvsim.identification import cleaning
 from auvsim.identification.columns import Meaning
 from auvsim.identification.table_text import Column
 
+DEGREE = math.radians(1.0) * 6_371_000.0  # of latitude, on the mean sphere [m]
 LARGEST = {"latitude": 90.0, "longitude": 180.0}  # [deg]
 EASTWARD = 360.0  # longitudes may count on to the east [deg]
 

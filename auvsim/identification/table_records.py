@@ -19,7 +19,6 @@ from auvsim.identification.table_text import Column
 from auvsim.ros import bags
 from estimators.core.types import Array
 
-EARTH = 6_371_000.0  # mean radius [m]
 NEEDED = ("time", "rudder", "shaft_speed")
 TWO = {"shaft_port", "shaft_starboard"}
 _EXAMPLES = {
@@ -193,12 +192,21 @@ def _signals(table: _Table, piece: _Piece, label: str, inputs: bool) -> tuple[Si
             checks.heading_unit(times, values, meaning, table.path)
             values = np.unwrap(values)
         found[quantity] = Signal(times=times, values=values, held=quantity == "rudder_command")
+        stated = table.columns[meaning.column].deviation
         if meaning.deviation is not None:
             deviations[quantity] = meaning.deviation
+        elif stated is not None:
+            deviations[quantity], told = _believed(stated * abs(meaning.factor), found[quantity], quantity)
+            notes += [f"{label}: {meaning.column}: {text}" for text in told]
     for quantity, value in table.constants.items():
         ends = np.array([piece.start, 0.5 * (piece.start + piece.stop), piece.stop])
         found[quantity] = Signal(times=ends, values=np.full(3, value))
     _combine(found)
+    if {"latitude", "longitude"} & deviations.keys():
+        narrowing = math.cos(math.radians(float(found["latitude"].values[0])))
+        for axis, angle, reach in (("north", "latitude", 1.0), ("east", "longitude", narrowing)):
+            if angle in deviations:
+                deviations.setdefault(axis, places.DEGREE * reach * deviations.pop(angle))
     _wind(found)
     lacking = [quantity for quantity in NEEDED[1:] if quantity not in found] if inputs else []
     if lacking:
@@ -244,6 +252,14 @@ def _samples(table: _Table, piece: _Piece, meaning: Meaning) -> tuple[Array, Arr
     return time[new], values[new], missing, int(len(time) - new.sum())
 
 
+def _believed(stated: float, signal: Signal, quantity: str) -> tuple[float, list[str]]:
+    """The deviation of a sample that the file states, unless its samples scatter by more; and what is said of that."""
+    scatter = noise(signal, quantity) if quantity in MEASURED[2:] else stated
+    if stated >= 0.5 * scatter:
+        return max(stated, scatter), []
+    return scatter, [f"its samples scatter by {scatter:.2g}, its covariance says {stated:.2g} (SI): the former counts"]
+
+
 def _combine(found: dict[str, Signal]) -> None:
     """Puts what goes by other names under those of a record."""
     if "rudder" not in found and "rudder_command" in found:
@@ -263,11 +279,10 @@ def _combine(found: dict[str, Signal]) -> None:
         found["ground_sway"] = Signal(times=north.times, values=body.imag)
     if {"latitude", "longitude"} <= found.keys() and "north" not in found:
         lat, lon = found["latitude"], found["longitude"]
-        reach = math.radians(1.0) * EARTH
         across = np.interp(lat.times, lon.times, lon.values) - lon.values[0]
-        found["north"] = Signal(times=lat.times, values=reach * (lat.values - lat.values[0]))
+        found["north"] = Signal(times=lat.times, values=places.DEGREE * (lat.values - lat.values[0]))
         narrowing = math.cos(math.radians(float(lat.values[0])))
-        found["east"] = Signal(times=lat.times, values=reach * narrowing * across)
+        found["east"] = Signal(times=lat.times, values=places.DEGREE * narrowing * across)
 
 
 def _wind(found: dict[str, Signal]) -> None:

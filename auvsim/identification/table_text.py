@@ -29,6 +29,7 @@ class Column:
     texts: NDArray[Any] | None = None  # (n,) the same as texts, where they are no numbers
     unit: str | None = None  # that the file gives apart from the name
     time: str | None = None  # the column that stamps it, where the file says so
+    deviation: float | None = None  # of a sample, in the column's unit, where the file says so
 
 
 def read(path: Path) -> tuple[dict[str, Column], list[str]]:

@@ -17,6 +17,7 @@ STORAGES = (".mcap", ".db3")
 METADATA = "metadata.yaml"
 JOINTS = "sensor_msgs/msg/JointState"
 _LONGEST = 9  # arrays of at most this many numbers are read, a 3x3 matrix
+_POSE = 36  # numbers in a 6x6 covariance, of which the diagonal is read
 _NUMBERS = ("bool", "int", "uint", "float")
 
 
@@ -139,8 +140,10 @@ def _paths(store: Any, kind: str, before: str = "") -> Iterator[tuple[str, Calla
             yield path, attrgetter(path)
         elif node == Nodetype.NAME and what != "std_msgs/msg/Header":
             yield from _paths(store, what, f"{path}.")
-        elif node == Nodetype.ARRAY and _is_number(what[0]) and int(what[1]) <= _LONGEST:
-            yield from ((f"{path}[{k}]", lambda m, get=attrgetter(path), k=k: get(m)[k]) for k in range(int(what[1])))
+        elif node == Nodetype.ARRAY and _is_number(what[0]):
+            count = int(what[1])
+            places = range(count) if count <= _LONGEST else range(0, _POSE, 7) if count == _POSE else ()
+            yield from ((f"{path}[{k}]", lambda m, get=attrgetter(path), k=k: get(m)[k]) for k in places)
 
 
 def _is_number(what: Any) -> bool:

@@ -11,6 +11,7 @@ from typing import Any
 from auvsim.base.errors import InputError
 
 DVL, WATER_LINKED, USBL = "marine_acoustic_msgs/msg/Dvl", "dvl_msgs/msg/DVL", "farol_msgs/msg/MUSBLFix"
+UNKNOWN = 1e6  # variance of what is not estimated
 _DEFINITIONS = {
     DVL: """
 # bottom 1, water 2

@@ -18,8 +18,9 @@ from auvsim.data import log as logs
 from auvsim.data.log import Log
 from auvsim.exchange import sensor_messages
 from auvsim.exchange.motion_messages import covariances
-from auvsim.exchange.ros_messages import UNKNOWN, Ros
+from auvsim.exchange.ros_messages import Ros
 from auvsim.identification import log_records, table_records
+from auvsim.ros.types import UNKNOWN
 from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.imu import ImuSettings
@@ -195,6 +196,16 @@ def test_reads_back_to_the_same_data(folder: Path, kind: str):
         np.testing.assert_allclose(theirs.signals[name].values - turns, signal.values, rtol=0.0, atol=tolerance)
         assert abs(math.remainder(turns, 2.0 * math.pi)) < 1e-9
     assert len(ours.signals) == 10
+
+
+def test_covariances_come_back(folder: Path, messages: dict[str, list]):
+    """The deviations that a reader of the MCAP file has are those of the data sheets, noise and bias together."""
+    (found,), notes = table_records.signals(folder / "trial.mcap", {})
+    assert found.deviations["heading"] == pytest.approx(math.radians(math.hypot(1.0, 0.5)))
+    assert found.deviations["yaw_rate"] == pytest.approx(math.radians(0.005) * math.sqrt(11.0))
+    fixed = {m.pose.covariance[0] for _, m in messages["/usbl/position"]}
+    assert found.deviations["north"] == found.deviations["east"] == pytest.approx(math.sqrt(fixed.pop()))
+    assert not any("scatter" in note for note in notes)
 
 
 def test_sensors_of_a_survey():
