@@ -210,8 +210,12 @@ def show_motion(found: MotionIdentification, planar: Identification | None = Non
         console.print(f"{'+' if good else '!'} {text}", soft_wrap=True)
     if planar is None:
         _notes(console, found.readings.notes)
-    horizons = Table(title="open loop", box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in ("after [s]", "of", "error [%]", "going on [%]", "95 % band [%]", "holds [%]", "coefficients' [%]"):
+    horizons = Table(
+        title="open loop: position error by the distance run, and the 95 % band", box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0), caption="going on: a vehicle that goes on as it began; alone: a band by the "
+        "coefficients' intervals alone",
+    )  # fmt: skip
+    for heading in ("after [s]", "of", "error [%]", "going on [%]", "band [%]", "holds [%]", "alone [%]"):
         horizons.add_column(heading, justify="right")
     for row in motion_page.horizon_rows(found):
         horizons.add_row(*row)

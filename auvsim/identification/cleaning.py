@@ -16,7 +16,7 @@ TIMES_NOISE = 20.0  # so many deviations of the usual steps make a spike
 # Values that loggers write where there is none (NMEA, ROS, NetCDF and instruments' own).
 FILLS = (999.0, 999.9, 999.99, 9999.0, 9999.9, 99999.0, 32767.0, 32768.0, 65535.0)
 ALONE = 3.0  # a fill value is this many times as large as all other values
-DRIVEN = ("rudder", "rudder_command", "shaft_speed")
+DRIVEN = ("rudder", "rudder_command", "shaft_speed", "shaft_port", "shaft_starboard", "side_thruster")
 SPIN = 1.0  # no vehicle turns faster [rad/s]
 AGREE = math.radians(30.0)  # of headings before and after what lies between
 BLOCK = 3  # least usual length of a run of held values, or of a block of equal stamps

@@ -307,8 +307,9 @@ def test_the_report_begins_with_trust(found: MotionIdentification) -> None:
     assert f"{at.share[k]:.1%} of the distance run after 60 s" in text
     assert any("later than positions" in said for _, said in verdicts(found))
     for inside, share, said, good in (
-        (0.95, at.share, "open loop", True), (0.5, at.share, "trust its error, not its band", False),
-        (0.95, found.none, "do not trust it", False),
+        (0.95, at.share, "trust the model to", True),
+        (0.5, at.share, "trust the model's error, not its band", False),
+        (0.95, found.none, "do not trust the model", False),
     ):  # fmt: skip
         judged = replace(at, inside=np.full(len(at.horizons), inside), share=share)
         other = replace(found, holdout=judged)
@@ -381,10 +382,10 @@ def test_the_command_starts_from_nothing(paths: list[Path], tmp_path: Path, caps
     arguments = ["identify", *map(str, logs[:3]), "--holdout", str(logs[3]), "--out", str(tmp_path / "o"), "--quick"]
     assert cli.main(arguments) == 0
     output = capsys.readouterr()
-    assert "open loop it is off by" in output.out.splitlines()[0]
+    assert output.out.splitlines()[0][2:].startswith("trust the model")
     assert "no shaft speed" in output.out
     page = (tmp_path / "o" / "report.html").read_text()
-    assert page.index("open loop it is off by") < page.index("Horizons")
+    assert page.index("trust the model") < page.index("Horizons")
     assert "remus" not in (page + output.out + (tmp_path / "o" / "motion_model.yaml").read_text()).lower()
     parameters = planar_sets.read(tmp_path / "o" / "parameters.yaml").planar()
     process = PlanarProcess(parameters, np.zeros(8))

@@ -11,6 +11,7 @@ import numpy as np
 from tanker import FINE, KINDS, Run, Sea, _logged, _order, _slow
 
 SPEED, SHAFT = 1.3, 80.0  # of the approach [m/s, rad/s]
+BOW, BOW_ARM, BOW_SHAFT = 2.5e-4, 0.8, 100.0  # thrust of a side thruster [N/(rad/s)^2], ahead [m], its speed [rad/s]
 SHARE = 0.45  # of the shaft's mean by which 25 deg of a tanker's rudder part the two screws
 
 
@@ -41,8 +42,11 @@ def slope(p: dict[str, float], x: np.ndarray, port: float, starboard: float, pus
     )  # fmt: skip
 
 
-def sail(kind: str, seed: int, sea: Sea, duration: float = 240.0, step: float = 0.2) -> Run:
-    """Sails a tanker's manoeuvre with the screws' difference for the rudder; its log has two shafts and no rudder."""
+def sail(kind: str, seed: int, sea: Sea, duration: float = 240.0, step: float = 0.2, *, bow: bool = False) -> Run:
+    """Sails a tanker's manoeuvre with the screws' difference for the rudder; its log has two shafts and no rudder.
+
+    With `bow` a side thruster pushes for some of every 12 s, to port or starboard, and is logged.
+    """
     generator = np.random.default_rng([seed, KINDS.index(kind), 3])
     p = parameters(seed)
     tables = {
@@ -55,6 +59,9 @@ def sail(kind: str, seed: int, sea: Sea, duration: float = 240.0, step: float = 
     x, state = np.array([0.0, 0.0, generator.uniform(-math.pi, math.pi), SPEED, 0.0, 0.0]), {}
     states, shafts = np.empty((count, 6)), np.empty((count, 2))
     screws = np.array([SHAFT, SHAFT])
+    orders = bow * np.random.default_rng([seed, KINDS.index(kind), 4]).choice([-1.0, -0.6, 0.0, 0.0, 0.7, 1.0], 60)
+    aside = BOW_SHAFT * np.repeat(orders, round(12.0 / FINE))[:count]  # [rad/s]
+    push = push + np.outer(BOW * aside * np.abs(aside), [0.0, 1.0 / p["m_v"], BOW_ARM / p["I"]])
     for k in range(count):
         rudder, mean = _order(kind, k * FINE, state, x, tables)
         apart = SHARE * rudder / math.radians(25.0)
@@ -68,4 +75,6 @@ def sail(kind: str, seed: int, sea: Sea, duration: float = 240.0, step: float = 
     rows = slice(None, None, round(step / FINE))
     for name, column in zip(("port", "starboard"), shafts.T, strict=True):
         log[f"n_{name} [rpm]"] = column[rows] * 30.0 / math.pi
+    if bow:
+        log["bow_thruster [rpm]"] = aside[rows] * 30.0 / math.pi
     return run._replace(log=log)

@@ -5,8 +5,8 @@ starts. Structures are compared after least squares and after segments first, th
 steps.
 
 Few records rank candidates by chance as much as by merit. So those that come near the best are averaged, each by the
-inverse of its mean square, unless what was left out speaks against it: the errors of candidates differ, and their mean
-has less of them than most (Bates and Granger, Operational Research Quarterly 20, 1969).
+inverse of its error to the fourth power, unless what was left out speaks against it: the errors of candidates differ,
+and their mean has less of them than most (Bates and Granger, Operational Research Quarterly 20, 1969).
 """
 
 import math
@@ -26,9 +26,12 @@ from estimators.planar.terms import ASYMMETRY, LABELS, PLANAR, STRUCTURES, TERMS
 
 FOLDS = 4
 NEAR = 2.0  # times the least error, up to which candidates are averaged
+# Weights go by the error to this power: the likelihood of as many independent errors of a normal density.
+POWER = 4.0
 # By what share an average may be worse than the simplest good candidate: the best of twenty looks better than it is.
 LUCK = 0.25
 KEPT = 4  # structures that go on to all steps
+QUICK_KEPT, QUICK_STEPS = 2, STEPS[1:2]  # the same where speed counts more
 EQUAL = 0.05  # a simpler model is no worse than the best one by more than this share of its error
 # Records from which on whole ones are left out, and asymmetry may be chosen. Within a record it cannot be told from
 # constant errors of its sensors and from its current: it predicts other parts of the record well, and nothing else.
@@ -140,8 +143,8 @@ class Folds:
         )  # fmt: skip
 
     def average(self, candidates: Sequence[Candidate]) -> Candidate:
-        """Their average, by the inverse of their mean squares."""
-        self._averaged = [(candidate, candidate.error**-2) for candidate in candidates]
+        """Their average, by the inverse of their errors to the power POWER."""
+        self._averaged = [(candidate, candidate.error**-POWER) for candidate in candidates]
         labels = {term for candidate in candidates for term in candidate.structure.terms}
         terms = tuple(label for label in LABELS if label in labels)
         return self.candidate(Structure(name=f"average of {len(candidates)}", terms=terms), AVERAGE)
@@ -189,8 +192,8 @@ def choose(
     for number, structure in enumerate(more):
         say(f"cross-validation: {structure.name}", 0.5 + 0.1 * number)
         found += [folds.candidate(seen(folds.whole, structure), step) for step in first]
-    last = list({c.structure.name: c.structure for c in _ranked(found)}.values())[: 1 if quick else KEPT]
-    steps = STEPS[1:2] if quick else STEPS[2:]
+    last = list({c.structure.name: c.structure for c in _ranked(found)}.values())[: QUICK_KEPT if quick else KEPT]
+    steps = QUICK_STEPS if quick else STEPS[2:]
     for number, structure in enumerate(last):
         for step in steps:
             say(f"{structure.name}: {step}", 0.7 + 0.25 * number / len(last))

@@ -5,6 +5,7 @@ import math
 import numpy as np
 
 import auvsim
+from auvsim.identification.motion.fit import WINDOW
 from auvsim.identification.motion.identify import MotionIdentification, planar, verdicts
 from auvsim.physics.motion_models import Judged, MotionModel, Value
 from auvsim.physics.planar_sets import HoldOut, Noise, PlanarSet, coefficients
@@ -36,13 +37,22 @@ def motion_model(found: MotionIdentification) -> MotionModel:
 
 
 def _noise(found: MotionIdentification) -> Array:
-    """Densities (3,) of white noise that spreads positions after the horizon as the white and constant parts do.
+    """Densities (3,) of white noise that spreads positions after the horizon as all that the model lacks does.
 
-    A constant acceleration b moves by b T^2 / 2, white noise of density q by a variance of q T^3 / 3.
+    A constant acceleration b moves by b T^2 / 2, white noise of density q by a variance of q T^3 / 3. The coefficients'
+    covariance C counts by the terms' integrals s over stretches of the data, of L seconds in all: sum(s' C s) / L.
     """
     constant = 0.75 * found.spread.constant**2 * found.choice.horizon
     factor = float(np.interp(found.choice.horizon, found.spread.horizons, found.spread.factors))
-    return factor * (found.spread.noise + constant)
+    return factor * (found.spread.noise + constant) + _of_coefficients(found)
+
+
+def _of_coefficients(found: MotionIdentification) -> Array:
+    equations = found.choice.folds.whole
+    terms = equations.terms[:, :, list(found.fit.structure.places)]
+    sums = np.array([terms[equations.stretch == k].sum(axis=0) for k in np.unique(equations.stretch)])
+    spread = np.einsum("sai,ij,saj->a", sums, found.covariance, sums)
+    return spread / (WINDOW * len(terms))
 
 
 def planar_set(found: MotionIdentification, masses: PlanarParameters | None = None) -> PlanarSet | None:

@@ -78,12 +78,16 @@ class MotionIdentification:
         """How far one may trust the model, in one line."""
         at, k = self.judged, self.place
         source = "held out" if self.holdout is not None else "left out of the fits"
-        low = "" if self.better else "do not trust it: no better than a vehicle that goes on as it began; "
+        low = (
+            "trust the model to"
+            if self.better
+            else ("do not trust the model, a vehicle that goes on as it began is foretold as well: it is off by")
+        )
         if self.better and at.inside[k] < HOLDS:
-            low = "trust its error, not its band, for what was held out is unlike what was fitted; "
+            low = "trust the model's error, not its band, for what was held out is unlike what was fitted: it is off by"
         u, v, r = self.fit.limits / fit.BEYOND
         return (
-            f"{low}open loop it is off by {at.share[k]:.1%} of the distance run after {at.horizons[k]:.0f} s (rms "
+            f"{low} {at.share[k]:.1%} of the distance run after {at.horizons[k]:.0f} s open loop (position error, rms "
             f"of {at.count[k]} predictions of what was {source}; going on as it began: {self.none[k]:.1%}); its 95 % "
             f"band of {at.radius[k]:.1%} holds {at.inside[k]:.0%} of them; known for speeds to {u:.2g} m/s, sway to "
             f"{v:.2g} m/s, {math.degrees(r):.2g} deg/s"
@@ -223,7 +227,8 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
         if not deviation < 0.5 * abs(value)
     ]  # fmt: skip
     if weak:
-        said.append((False, f"not known by themselves: {', '.join(weak)}; look at predictions, not at these"))
+        text = f"{len(weak)} of {terms} coefficients are not known by themselves, as the report's table shows"
+        said.append((False, f"{text}: look at predictions, not at these"))
     lost = [f"{c.structure.name} by {c.step}" for c in found.choice.candidates if not c.converged]
     if lost:
         said.append((False, f"not converged, and not kept: {', '.join(lost)}"))
