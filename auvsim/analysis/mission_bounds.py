@@ -16,7 +16,7 @@ from auvsim.base.frames import Array
 from auvsim.simulation import building
 from auvsim.simulation.scenario import Scenario
 from estimators.core.models.odometry import SPACE, Displacement, N
-from estimators.core.odometry_bounds import Sights, bounds, observability, sampled
+from estimators.core.odometry_bounds import Sights, Told, bounds, observability, sampled
 from estimators.core.types import Gaussian
 from estimators.motion_radius.bank import BankFilter, BankState
 from estimators.motion_radius.geometry import PROBABLE, second_solution
@@ -220,11 +220,22 @@ def _at(stations, start, own, about, heard, moved, prior, times, order, rows, ou
     delay = np.array([heard[s].delay for s, _ in order])
     arrivals = np.maximum.accumulate(times + delay)  # what comes in before an earlier one waits for it
     compass = np.array([heard[s].by_compass for s, _ in order])
-    sights = Sights(times, rows, ranges, bearings, arrivals[None], compass)
+    sights = Sights(times, rows, ranges, bearings, arrivals[None], compass, _told(heard, order))
     covariance = bounds(prior, sights, relative[:, None], outputs, about.walks)
     best = ranges.min(axis=-1, keepdims=True)
     told = observability(times, relative, ranges=ranges < best / HEARD, bearings=np.isfinite(bearings))
     return covariance, told.rank, told.condition
+
+
+def _told(heard: Sequence[Source], order: Array) -> Told | None:
+    """Errors of the places that sources tell, sight by sight."""
+    tellers = [s for s, source in enumerate(heard) if source.told is not None]
+    if not tellers:
+        return None
+    numbers = np.array([tellers.index(s) if s in tellers else -1 for s, _ in order])
+    of = [(heard[s].told, k) for s, k in order]
+    kept = np.array([told.kept[k] if told else 0.0 for told, k in of])
+    return Told(numbers, kept, np.array([told.added[k] if told else 0.0 for told, k in of]))
 
 
 def _mirrors(coarse, start, own, about, heard, moved, prior, times, order, rows, done) -> Array:
@@ -236,12 +247,13 @@ def _mirrors(coarse, start, own, about, heard, moved, prior, times, order, rows,
         Gaussian(mean=np.zeros(N), covariance=prior), about.noise, walks=about.walks, pruned=len(times) + 1
     )
     mine = own.at(times)
+    white = np.array([heard[s].white for s, _ in order])
     for m, n in np.ndindex(*found.shape):
         station = np.array([[coarse[0][m], coarse[1][n]]])
         relative = _relative(station, start, own, heard, moved, times, order)
         state = _truth_and_mirrors(own, prior, relative[0], times, about.walks)
         places = mine - relative[0] * (1.0, 1.0, -1.0)
-        variances = _variances(heard, relative, order)[0][0]
+        variances = _variances(heard, relative, order)[0][0] + white
         for k, row in enumerate(rows.tolist()):
             state = state._replace(
                 since=Displacement(*(a + b for a, b in zip(state.since, row, strict=True))), verdicts=()

@@ -60,6 +60,20 @@ class Source:
     by_compass: bool  # whether bearings are by the vehicle's compass
     delay: float  # from then to when it is known [s]
     errors: Mapping[str, float]  # deviations of states of `core.models.odometry` that it brings
+    told: "ToldError | None" = None  # of the places; None: they are known
+
+    @property
+    def white(self) -> float:
+        """Variance [m^2] of white noise of each told place that has the density of what it errs by."""
+        return self.told.density / float(np.diff(self.times).mean()) if self.told and len(self.times) > 1 else 0.0
+
+
+class ToldError(NamedTuple):
+    """The error along each axis of a place that its filter follows by fixes, from packet to packet."""
+
+    kept: Array  # (k,) share that is left of the error at the packet before
+    added: Array  # (k,) variance of what is new [m^2]
+    density: float  # at low frequencies, that of the fixes [m^2 s]
 
 
 class Odometry(NamedTuple):
@@ -150,10 +164,10 @@ def sources(scenario: Scenario, name: str, ways: Mapping[str, Way]) -> list[Sour
     for other in ways:
         its = scenario.vehicles[other]
         if other != name and its.modem is not None:
-            told = _Teller(other, its.modem, its.clock, told_density(its), ways[other].at)
+            told = _Teller(other, its.modem, its.clock, its, ways[other].at)
             found.append(_told(scenario, name, told))
     for other, fixed in scenario.fixed_modems.items():
-        told = _Teller(other, fixed.modem, fixed.clock, 0.0, lambda times, place=fixed.place: _still(times, place))
+        told = _Teller(other, fixed.modem, fixed.clock, None, lambda times, place=fixed.place: _still(times, place))
         found.append(_told(scenario, name, told))
     found = [source for source in found if source is not None]
     for sensor, settings in on_board(vehicle.sensors):
@@ -176,7 +190,7 @@ class _Teller(NamedTuple):
     name: str
     modem: ModemSettings
     clock: ClockSettings
-    density: float  # of the error of its place along each axis [m^2 s]
+    vehicle: VehicleSettings | None  # None: its place is known
     at: Callable[[Array], Array]  # times (k,) [s] -> north, east, depth (k, 3) [m]
 
 
@@ -198,7 +212,11 @@ def _told(scenario: Scenario, name: str, teller: _Teller) -> Source | None:
     network, sender, receiver = scenario.network, its.modem, own.modem
     bits = packet_bits(NUMBERS[STATE])
     times = np.arange(phase, scenario.duration, period)
-    timing = (own.sound_speed * receiver.timing_noise) ** 2 + teller.density / period
+    timing = (own.sound_speed * receiver.timing_noise) ** 2
+    told = None
+    if teller.vehicle is not None and (fixes := _fixes(teller.vehicle)):
+        times = times[times >= 1.0 / fixes.rate]  # who does not know its place tells nothing
+        told = told_error(teller.vehicle, times)
 
     def heard(distance: Array) -> Array:
         nodes, weights = FADES
@@ -224,17 +242,48 @@ def _told(scenario: Scenario, name: str, teller: _Teller) -> Source | None:
         name=other, times=times, places=teller.at(times), range_variance=lambda distance: timing / heard(distance),
         bearing_variance=None if receiver.bearing_noise_deg is None else bearing, by_compass=True,
         delay=delay + receiver.processing + sender.duration(bits),
-        errors=errors,
+        errors=errors, told=told,
     )  # fmt: skip
 
 
-def told_density(vehicle: VehicleSettings) -> float:
-    """Density of a leader's own position error [m^2 s], along each axis: that of its fixes, which its filter follows.
+class _Fixes(NamedTuple):
+    """All fixes of a vehicle as those of one sensor."""
 
-    A filter shapes the error of its fixes in time, but leaves its density at low frequencies as it is; 0 without fixes.
+    rate: float  # that arrive [1/s]
+    variance: float  # of each axis [m^2]
+
+
+def _fixes(vehicle: VehicleSettings) -> _Fixes | None:
+    all_ = [s for _, s in on_board(vehicle.sensors) if isinstance(s, FixSettings) and s.dropout_probability < 1.0]
+    if not all_:
+        return None
+    rates = [s.rate * (1.0 - s.dropout_probability) for s in all_]
+    return _Fixes(sum(rates), sum(rates) / sum(r / s.noise**2 for r, s in zip(rates, all_, strict=True)))
+
+
+def told_error(vehicle: VehicleSettings, times: Array) -> ToldError:
+    """How the error of a vehicle with fixes goes on between `times` (k,) [s], at which it tells its place.
+
+    It is as large as the vehicle's filter says: its gain lets it forget a fix only slowly, so that what it tells has
+    the density of the fixes' white noise at low frequencies and much less at high ones.
     """
-    fixes = [s for _, s in on_board(vehicle.sensors) if isinstance(s, FixSettings)]
-    return 1.0 / sum(s.rate * (1.0 - s.dropout_probability) / s.noise**2 for s in fixes) if fixes else 0.0
+    fixes = _fixes(vehicle)
+    assert fixes is not None
+    walk = float(getattr(vehicle.estimator, "position_noise", 0.0))
+    kept, added = np.ones(len(times)), np.zeros(len(times))
+    P, last, count = 0.0, 1.0 / fixes.rate, 0
+    for k, time in enumerate(times.tolist()):
+        while (count + 1) / fixes.rate <= time + 1e-9:
+            count += 1
+            new = walk * max(0.0, count / fixes.rate - last)
+            P += new
+            gain = P / (P + fixes.variance) if count > 1 else 1.0
+            P, last = gain * fixes.variance, count / fixes.rate
+            kept[k] *= 1.0 - gain
+            added[k] = (1.0 - gain) ** 2 * (added[k] + new) + gain**2 * fixes.variance
+        new = walk * (time - last)
+        P, added[k], last = P + new, added[k] + new, time
+    return ToldError(kept, added, fixes.variance / fixes.rate)
 
 
 def _beacon(scenario: Scenario, sensor: str, s: RangeSettings) -> Source:

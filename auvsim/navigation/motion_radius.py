@@ -58,8 +58,9 @@ class MotionRadiusNavigator:
         north, east = planned_start(setup)
         walks = SPACE.vector({"current_north": s.current_noise, "current_east": s.current_noise})
         self._filter = BankFilter(
-            SPACE.belief({"north": north, "east": east}, deviations), noise, walks=walks, gate=0.9999
-        )
+            SPACE.belief({"north": north, "east": east}, deviations), noise, walks=walks, gate=0.9999,
+            memory=s.memory,
+        )  # fmt: skip
         self._range_sd = math.hypot(s.range_noise, speed * modem.modem.timing_noise)
         self.reset()
 

@@ -20,6 +20,14 @@ from estimators.core.types import Array
 DEFICIENT = 1e-6  # singular value over the largest below which a direction counts as unobservable
 
 
+class Told(NamedTuple):
+    """Errors of places that are told, along each axis, which last from a source's sight to its next."""
+
+    sources: NDArray[np.int64]  # (k,) number of who tells; -1: its place is known
+    kept: Array  # (k,) share that is left of the error at the same source's sight before; not used at its first
+    added: Array  # (k,) variance of what is new in it [m^2]
+
+
 class Sights(NamedTuple):
     """When something is measured and how well, in the order of stamps; the first may be at the start."""
 
@@ -29,6 +37,7 @@ class Sights(NamedTuple):
     bearing_variance: Array  # (k,) or (s, k) [rad^2]; inf: no bearing
     arrivals: Array  # (d, k) [s], of d draws of what is lost (inf) and late, none overtaking another
     by_compass: Array | None = None  # (k,) whether a bearing is by the vehicle's compass; None: all are
+    told: Told | None = None  # errors of the places of what is ranged to; None: these are known
 
 
 def at_once(
@@ -63,19 +72,23 @@ def bounds(
             f"(stations, truths, {k}, 3) and ({k}, 6)"
         )
     last = np.array([_last_heard(sights.times, arrivals, outputs) for arrivals in sights.arrivals])
-    used = np.flatnonzero(np.diagonal(prior) + (0.0 if walks is None else walks) > 0.0)
-    size = max(4, int(used[-1]) + 1 if len(used) else 4)
     q = np.zeros(N) if walks is None else np.array(walks, dtype=float)
+    states = np.flatnonzero((np.diagonal(prior) + q > 0.0) | (np.arange(N) < 4))
+    told = sights.told or Told(np.full(k, -1), np.zeros(k), np.zeros(k))
+    n, size = len(states), len(states) + 2 * (1 + int(told.sources.max(initial=-1)))
+    start, densities = np.zeros((size, size)), np.zeros(size)
+    start[:n, :n], densities[:n] = prior[np.ix_(states, states)], q[states]
     shape = (len(relative), k)
     found = _bounds(
-        np.array(prior[:size, :size], dtype=float), np.ascontiguousarray(sights.displacements), relative,
+        start, states, np.ascontiguousarray(sights.displacements), relative,
         np.ascontiguousarray(np.broadcast_to(sights.range_variance, shape)),
         np.ascontiguousarray(np.broadcast_to(sights.bearing_variance, shape)),
         np.ones(k, dtype=bool) if sights.by_compass is None else np.array(sights.by_compass, dtype=bool),
-        np.isfinite(sights.arrivals), last, np.array(outputs, dtype=np.int64), q[:size],
+        np.isfinite(sights.arrivals), last, np.array(outputs, dtype=np.int64), densities,
+        np.array(told.sources, dtype=np.int64), np.array(told.kept, dtype=float), np.array(told.added, dtype=float),
     )  # fmt: skip
     full = np.zeros((*found.shape[:2], N, N))
-    full[..., :size, :size] = found
+    full[:, :, states[:, None], states] = found[..., :n, :n]
     return full
 
 
@@ -90,17 +103,24 @@ def _last_heard(times: Array, arrivals: Array, outputs: NDArray[np.int64]) -> ND
 
 
 @compiled
-def _bounds(prior, displacements, relative, range_variance, bearing_variance, by_compass, heard, last, outputs, q):
+def _bounds(
+    prior, states, displacements, relative, range_variance, bearing_variance, by_compass, heard, last, outputs, q,
+    sources, kept, added,
+):  # fmt: skip
+    """Bounds (s, o, n, n) of `states` and then of the errors, north and east, of what each source tells."""
     stations, truths, k = relative.shape[0], relative.shape[1], relative.shape[2]
-    draws, n = heard.shape[0], prior.shape[0]
+    draws, n, own = heard.shape[0], prior.shape[0], len(states)
     found = np.zeros((stations, len(outputs), n, n))
     F9, x, following, H9, work = np.eye(9), np.zeros(9), np.zeros(9), np.zeros((1, 9)), np.empty((n, n))
-    Fs = np.empty((k, n, n))
+    Fs = np.zeros((k, n, n))
     for i in range(k):
         d = (displacements[i, 0], displacements[i, 1], displacements[i, 2])
         move(x, d, following, F9)
-        Fs[i] = F9[:n, :n]
-    mean, zero, R = np.zeros(n), np.zeros(1), np.empty((1, 1))
+        Fs[i] = np.eye(n)
+        for a in range(own):
+            for b in range(own):
+                Fs[i, a, b] = F9[states[a], states[b]]
+    mean, zero, H, R = np.zeros(n), np.zeros(1), np.empty((1, n)), np.empty((1, 1))
     for s in range(stations):
         for draw in range(draws):
             P, o = prior.copy(), 0
@@ -109,23 +129,42 @@ def _bounds(prior, displacements, relative, range_variance, bearing_variance, by
                 o += 1
             for i in range(k):
                 _step(P, Fs[i], displacements[i], q, work)
+                error = own + 2 * sources[i]
+                if sources[i] >= 0:
+                    for c in range(error, error + 2):
+                        P[c, :] *= kept[i]
+                        P[:, c] *= kept[i]
+                        P[c, c] += added[i]
                 if heard[draw, i]:
                     for truth in range(truths):
                         x[0], x[1] = relative[s, truth, i, 0], relative[s, truth, i, 1]
                         if range_variance[s, i] < math.inf:
                             show_range(x, 0.0, 0.0, relative[s, truth, i, 2], H9)
+                            _of_states(H9, states, sources[i], H)
                             R[0, 0] = range_variance[s, i] * truths
-                            P = loops.correct(mean, P, H9[:, :n].copy(), zero, R, math.inf)[1]
+                            P = loops.correct(mean, P, H, zero, R, math.inf)[1]
                         if bearing_variance[s, i] < math.inf:
                             show_bearing(x, 0.0, 0.0, H9)
                             if not by_compass[i]:
                                 H9[0, 8] = 0.0
+                            _of_states(H9, states, sources[i], H)
                             R[0, 0] = bearing_variance[s, i] * truths
-                            P = loops.correct(mean, P, H9[:, :n].copy(), zero, R, math.inf)[1]
+                            P = loops.correct(mean, P, H, zero, R, math.inf)[1]
                 while o < len(outputs) and last[draw, o] == i:
                     _predicted(P.copy(), Fs, displacements, q, i + 1, outputs[o] + 1, work, found[s, o])
                     o += 1
     return found / draws
+
+
+@compiled
+def _of_states(H9, states, source, H):
+    """Fills the derivative H (1, n) from that by all states; a place told wrong is like the own place being wrong."""
+    H[:] = 0.0
+    for a in range(len(states)):
+        H[0, a] = H9[0, states[a]]
+    if source >= 0:
+        error = len(states) + 2 * source
+        H[0, error], H[0, error + 1] = H9[0, 0], H9[0, 1]
 
 
 @compiled

@@ -3,7 +3,8 @@
 Each range is used once; its variance holds that of the leader's place. One of the kind `SHARED` corrects each filter,
 but tells nothing of which of them is right. The states are those of
 `core.models.odometry`: give a deviation at the start to what is to be estimated, clock, sound speed, speed log and
-compass included; what has none is taken as right.
+compass included; what has none is taken as right. What a leader's filter errs by lasts from packet to packet: with
+`memory` each leader's error, north and east, are two states more, a Gauss-Markov process of the variance it tells.
 """
 
 import math
@@ -32,18 +33,19 @@ REACH, WIDTH = 1.8, 0.36  # outermost currents of the bank and deviation of each
 class BankState(NamedTuple):
     """What a node keeps: each filter's belief at the last range, and the displacement since."""
 
-    means: Array  # (m, 9)
-    covariances: Array  # (m, 9, 9)
+    means: Array  # (m, n), of the 9 states and the errors of each leader's place
+    covariances: Array  # (m, n, n)
     weights: Array  # (m,) probabilities
-    q: Array  # (9,) densities of random walks of the states [unit^2/s]
+    q: Array  # (n,) densities of random walks of the states [unit^2/s]
     since: Displacement = Displacement()
     accepted: int = 0  # ranges so far
     geometry: Geometry = Geometry()
     verdicts: Verdicts = ()
+    leaders: tuple[tuple[str, float], ...] = ()  # whose errors are states, and the stamp of the last range to each [s]
 
     @property
     def modes(self) -> tuple[Array, Array]:
-        """Means (m, 9) and covariances (m, 9, 9), predicted from the last range to now."""
+        """Means (m, n) and covariances (m, n, n), predicted from the last range to now."""
         return predict_modes(self.means, self.covariances, self.since, self.q)
 
     @property
@@ -51,7 +53,7 @@ class BankState(NamedTuple):
         """The filters' beliefs merged, now."""
         means, covariances = self.modes
         mean, covariance = loops.merge(means, covariances, self.weights, np.zeros(0, dtype=np.int64))
-        return Gaussian(mean=mean, covariance=covariance)
+        return Gaussian(mean=mean[:N], covariance=covariance[:N, :N])
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -71,9 +73,10 @@ class BankFilter:
             longer probable are given up.
         walks: Densities (9,) of random walks of the states [unit^2/s]; None: all are constant.
         gate: Probability with which a range that fits is accepted by the filter that it fits best; None accepts all.
+        memory: Time constant of the errors of leaders' places [s]; 0: they are white noise.
 
     Raises:
-        ParameterError: The start has other states, or the bank has no filter.
+        ParameterError: The start has other states, the bank has no filter, or the memory is below 0.
     """
 
     def __init__(
@@ -85,14 +88,17 @@ class BankFilter:
         pruned: int = 30,
         walks: Array | None = None,
         gate: float | None = None,
+        memory: float = 0.0,
     ) -> None:
         if start.mean.shape != (N,) or side < 1:
             raise ParameterError(
                 f"start of {start.mean.size} states and {side} currents a side; there must be {N} states, "
                 f"{', '.join(SPACE.names)}, and 1 current or more"
             )
+        if not memory >= 0.0:
+            raise ParameterError(f"memory {memory} s of errors of leaders' places must be 0 s or more")
         self._means, self._covariances, self._weights = spread_over_currents(start, side)
-        self._noise, self._pruned = noise, pruned
+        self._noise, self._pruned, self._memory = noise, pruned, memory
         self._q = np.zeros(N) if walks is None else np.array(walks, dtype=float)
         self._limit = math.inf if gate is None else chi_square(gate, 1)
 
@@ -120,10 +126,14 @@ class BankFilter:
         return state
 
     def _ranged(self, state: BankState, m: Measurement) -> BankState:
-        north, east, depth, own = m.parameters
-        predicted = predict_modes(state.means, state.covariances, state.since, state.q)
+        north, east, depth, own, told = m.parameters
         distance, variance = float(m.value[0]), float(m.covariance[0, 0])
-        means, covariances, logs, nis = correct_modes(*predicted, distance, variance, north, east, depth - own)
+        white, error = variance, -1
+        if self._memory > 0.0 and m.kind == KIND and told > 0.0:
+            state, error = remembered(state, m.source, m.stamp, told, self._memory)
+            white -= told * max(0.0, 1.0 - ((depth - own) / distance) ** 2)
+        predicted = predict_modes(state.means, state.covariances, state.since, state.q)
+        means, covariances, logs, nis = correct_modes(*predicted, distance, white, north, east, depth - own, error)
         best = float(nis[state.weights > 1e-6].min())
         if best > self._limit:
             return state._replace(verdicts=(*state.verdicts, (m, OUTLIER, best)))
@@ -137,8 +147,40 @@ class BankFilter:
             means, covariances, weights = pruned(means, covariances, weights)
         geometry = state.geometry.extended(state.since, north, east, distance, variance)
         return BankState(
-            means, covariances, weights, state.q, Displacement(), accepted, geometry, (*state.verdicts, verdict)
-        )
+            means, covariances, weights, state.q, Displacement(), accepted, geometry, (*state.verdicts, verdict),
+            state.leaders,
+        )  # fmt: skip
+
+
+def remembered(state: BankState, leader: str, stamp: float, told: float, memory: float) -> tuple[BankState, int]:
+    """The state with the error of a leader's place as of `stamp` [s], and where that is among the states.
+
+    Args:
+        state: Before a range.
+        leader: To whom.
+        stamp: Of the range [s].
+        told: Variance of the error along each axis that the leader tells [m^2].
+        memory: Time constant of the error [s].
+    """
+    names = [name for name, _ in state.leaders]
+    number = names.index(leader) if leader in names else len(names)
+    error = N + 2 * number
+    means, covariances, q, leaders = state.means, state.covariances, state.q, list(state.leaders)
+    if number == len(names):
+        means = np.pad(means, ((0, 0), (0, 2)))
+        covariances, q = np.pad(covariances, ((0, 0), (0, 2), (0, 2))), np.pad(q, (0, 2))
+        kept = 0.0
+        leaders.append((leader, stamp))
+    else:
+        means, covariances = means.copy(), covariances.copy()
+        kept = math.exp(-max(0.0, stamp - leaders[number][1]) / memory)
+        leaders[number] = (leader, stamp)
+    both = slice(error, error + 2)
+    means[:, both] *= kept
+    covariances[:, both] *= kept
+    covariances[:, :, both] *= kept
+    covariances[:, (error, error + 1), (error, error + 1)] += told * (1.0 - kept**2)
+    return state._replace(means=means, covariances=covariances, q=q, leaders=tuple(leaders)), error
 
 
 def spread_over_currents(start: Gaussian, side: int) -> tuple[Array, Array, Array]:
@@ -178,7 +220,7 @@ def _squared_distance(error: Array, covariance: Array) -> float:
 
 @compiled
 def predict_modes(means, covariances, d, q):
-    """Means (m, 9) and covariances (m, 9, 9) after a displacement."""
+    """Means (m, n) and covariances (m, n, n) after a displacement."""
     x, P = np.empty_like(means), covariances.copy()
     if d[0] <= 0.0:
         x[:] = means
@@ -191,13 +233,19 @@ def predict_modes(means, covariances, d, q):
 
 
 @compiled
-def correct_modes(means, covariances, distance, variance, north, east, down):
-    """Means (m, 9), covariances (m, 9, 9), log likelihoods (m,) and NIS (m,) after a range."""
+def correct_modes(means, covariances, distance, variance, north, east, down, error):
+    """Means (m, n), covariances (m, n, n), log likelihoods (m,) and NIS (m,) after a range.
+
+    The error of the place to which it is stands at `error` among the states, -1: it is none of them.
+    """
     m, n = means.shape
     x, P, logs, nis = np.empty_like(means), np.empty_like(covariances), np.empty(m), np.empty(m)
     H, R, residual = np.empty((1, n)), np.array([[variance]]), np.empty(1)
     for k in range(m):
         residual[0] = distance - show_range(means[k], north, east, down, H)
+        if error >= 0:
+            residual[0] -= H[0, 0] * means[k, error] + H[0, 1] * means[k, error + 1]
+            H[0, error], H[0, error + 1] = H[0, 0], H[0, 1]
         x[k], P[k], _, S, nis[k], _ = loops.correct(means[k], covariances[k], H, residual, R, math.inf)
         logs[k] = -0.5 * (nis[k] + math.log(2.0 * math.pi * S[0, 0]))
     return x, P, logs, nis

@@ -74,7 +74,7 @@ def _gathered(nodes: Sequence[Node[Any]], noise: OdometryNoise) -> tuple[Array, 
             since = since.extended(u[0], u[1], u[2], node.time - nodes[k - 1].time, noise)
         for m in node.measurements:
             if m.kind == KIND:
-                north, east, depth, own = m.parameters
+                north, east, depth, own, _ = m.parameters
                 times.append(node.time)
                 displacements.append(since)
                 ranges.append((m.value[0], m.covariance[0, 0], north, east, depth - own))

@@ -81,7 +81,7 @@ class PaperFilter:
             if m.kind != KIND:
                 state = state._replace(verdicts=(*state.verdicts, (m, NO_MODEL, np.nan)))
                 continue
-            north, east, depth, own = m.parameters
+            north, east, depth, own, _ = m.parameters
             flat = flattened(float(m.value[0]), depth - own, 0.0)
             if flat is None:
                 state = state._replace(verdicts=(*state.verdicts, (m, STEEP, np.nan)))

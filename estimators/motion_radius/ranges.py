@@ -43,7 +43,8 @@ def leader_range(
     variance = deviation**2 + (1.0 - steep**2) * leader_deviation**2 + steep**2 * depth_deviation**2
     return Measurement(
         kind=KIND, source=source, value=np.array([distance]), covariance=np.array([[variance]]), stamp=stamp,
-        received=stamp if received is None else received, sequence=sequence, parameters=(*leader, own),
+        received=stamp if received is None else received, sequence=sequence,
+        parameters=(*leader, own, leader_deviation**2),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ import pytest
 from auvsim import cli
 from auvsim.analysis import mission_bound_files
 from auvsim.analysis.mission_bounds import FollowerBound, mission_bounds
-from auvsim.analysis.mission_plan import sources, told_density, way
+from auvsim.analysis.mission_plan import sources, told_error, way
 from auvsim.base.errors import InputError
 from auvsim.data import netcdf
 from auvsim.simulation import building
@@ -36,7 +36,7 @@ def mean_square(start, seed, amplitudes=(40.0, 40.0), side=7, noises=(2e-2, 1.0)
     """Mean squared position error of a run after 500 s: written apart from the plan, from the scenario's own numbers.
 
     DVL 0.02 m/s at 2 Hz and compass 1 deg at 10 Hz, averaged over a second; constant errors of both; ranges of timing
-    noise and of fixes of 1 m each 10 s, told each 8 s.
+    noise, each 8 s, to where the leader's filter of fixes takes it to be.
     """
     rng = np.random.default_rng(seed)
     t = np.arange(END)
@@ -58,21 +58,34 @@ def mean_square(start, seed, amplitudes=(40.0, 40.0), side=7, noises=(2e-2, 1.0)
     }  # fmt: skip
     believed = own[0] + 3.0 * rng.standard_normal(2)
     prior = SPACE.belief({"north": believed[0], "east": believed[1]}, deviations)
-    bank = BankFilter(prior, noise, side=side)
+    bank = BankFilter(prior, noise, side=side, memory=50.0)
     state = bank.start([Node(0.0, (), [], True)], 0)
-    sigma = math.sqrt((1500.0 * 125e-6) ** 2 + 10.0 / 8.0)
+    sigma, errors = 1500.0 * 125e-6, leaders_errors(rng)
     squares = []
     for k in range(len(t)):
         state = bank.predict(state, (ahead[k], starboard[k], compass[k]), 1.0)
         second = k + 1
-        if second % 8 == 4 and rng.random() > 0.05:
+        if second % 8 == 4 and second > 10 and rng.random() > 0.05:
             off = math.hypot(*(own[second] - leader[second]), 2.0)
             r = off + offset + drift * second + sigma * rng.standard_normal()
-            m = leader_range(r, (*leader[second], 12.0), deviation=sigma, stamp=float(second), depth=10.0)
+            told = (*(leader[second] + errors[second]), 12.0)
+            m = leader_range(r, told, deviation=sigma, leader_deviation=math.sqrt(0.2), stamp=float(second), depth=10.0)
             state = bank.correct(state, float(second), [m])
         if second > 500 and second % 8 == 4:
             squares.append(float(((state.belief.mean[:2] - own[second]) ** 2).sum()))
     return np.mean(squares)
+
+
+def leaders_errors(rng):
+    """Errors (t, 2) [m] of a filter of fixes of 1 m each 10 s and a random walk, as the scenario's leader has it."""
+    error, P, found = np.zeros(2), 1e6, []
+    for second in range(int(END) + 1):
+        error, P = error + math.sqrt(4e-3) * rng.standard_normal(2), P + 4e-3
+        if second % 10 == 0 and second > 0:
+            K = P / (P + 1.0)
+            error, P = (1.0 - K) * error + K * rng.standard_normal(2), (1.0 - K) * P
+        found.append(error)
+    return np.array(found)
 
 
 @pytest.fixture(scope="module")
@@ -97,8 +110,22 @@ def test_a_planned_way_is_the_tracks_own_law():
     assert found.depths[-1] == 10.0
 
 
-def test_what_is_told_has_the_density_of_its_fixes():
-    assert told_density(load_scenario("leader_follower").vehicles["leader"]) == pytest.approx(10.0)
+def test_what_is_told_errs_as_the_leaders_filter_says_and_lasts_as_long_as_that_remembers():
+    """Of a filter of fixes in the steady state: P (P + q T) / R = q T, P after a fix; independently summed here."""
+    leader, times = load_scenario("leader_follower").vehicles["leader"], np.arange(12.0, 4000.0, 8.0)
+    told = told_error(leader, times)
+    variance, error = [], 0.0
+    for kept, added in zip(told.kept, told.added, strict=True):
+        error = kept**2 * error + added
+        variance.append(error)
+    q, R = 4e-3 * 10.0, 1.0
+    after = 0.5 * (-q + math.sqrt(q * q + 4.0 * q * R))
+    assert variance[0] == pytest.approx(R + 4e-3 * 2.0)  # the first fix is all it has
+    assert min(variance[-25:]) == pytest.approx(after, rel=1e-6)
+    assert max(variance[-25:]) == pytest.approx(after + 4e-3 * 8.0, rel=1e-6)
+    gain = after / R
+    assert np.prod(told.kept[-50:]) == pytest.approx((1.0 - gain) ** 40, rel=1e-9)  # 400 s: 50 packets, 40 fixes
+    assert told.density == pytest.approx(10.0)
 
 
 @pytest.mark.parametrize("runs", [16, pytest.param(300, marks=pytest.mark.slow)])

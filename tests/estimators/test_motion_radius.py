@@ -460,3 +460,42 @@ def test_a_range_to_one_that_may_share_its_error_decides_between_no_filters():
     assert np.array_equal(shared.weights, state.weights)
     assert np.abs(plain.weights - state.weights).max() > 0.01
     assert [reason for _, reason, _ in shared.verdicts] == [""]
+
+
+def test_errors_of_leaders_that_last_are_states():
+    """Two far leaders, heard in turn, without odometry noise: generalised least squares with what they say they err."""
+    count, dt, memory, deviation = 8, 30.0, 70.0, 0.5
+    sides = np.array([[1.0, 0.0], [0.6, 0.8]])
+    rng = np.random.default_rng(5)
+    order, told = [0, 1, 1, 0, 1, 0, 0, 1], np.linspace(1.0, 2.5, count)
+    start = SPACE.belief({}, {"north": 4.0, "east": 6.0, "current_north": 0.1, "current_east": 0.2})
+    bank = BankFilter(start, OdometryNoise(), side=1, memory=memory)
+    state = bank.start([Node(0.0, (), [], True)], 0)
+    times, reach = dt * np.arange(1, count + 1), 1e7
+    values = rng.standard_normal(count)
+    for k, leader in enumerate(order):
+        state = bank.predict(state, (0.0, 0.0, 0.0), dt)
+        m = leader_range(
+            reach + values[k], (*(-reach * sides[leader]), 0.0), deviation=deviation, leader_deviation=told[k],
+            stamp=times[k], source=str(leader),
+        )  # fmt: skip
+        state = bank.correct(state, times[k], [m])
+    S = deviation**2 * np.eye(count)
+    for leader in (0, 1):
+        of, variance = [k for k in range(count) if order[k] == leader], 0.0
+        for a, i in enumerate(of):
+            left = math.exp(-(times[i] - times[of[a - 1]]) / memory) if a else 0.0
+            variance = left**2 * variance + told[i] ** 2 * (1.0 - left**2)
+            for j in of[a:]:
+                S[i, j] += variance * math.exp(-(times[j] - times[i]) / memory)
+                S[j, i] = S[i, j]
+    H = np.hstack((sides[order], sides[order] * times[:, None]))
+    prior = np.diag([16.0, 36.0, 0.01, 0.04])
+    P = np.linalg.inv(np.linalg.inv(prior) + H.T @ np.linalg.solve(S, H))
+    F = np.block([[np.eye(2), times[-1] * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
+    belief = state.belief
+    assert belief.covariance[:4, :4] == pytest.approx(F @ P @ F.T, rel=1e-5)
+    assert belief.mean[:4] == pytest.approx(F @ P @ H.T @ np.linalg.solve(S, values), rel=1e-4, abs=1e-4)
+    assert len(belief.mean) == len(SPACE)
+    with pytest.raises(ParameterError, match="memory -1"):
+        BankFilter(start, NOISE, memory=-1.0)

@@ -5,7 +5,7 @@ import pytest
 
 from estimators.core.errors import ParameterError
 from estimators.core.models.odometry import SPACE, Displacement, OdometryNoise
-from estimators.core.odometry_bounds import Sights, at_once, bounds, displacements_between, observability, sampled
+from estimators.core.odometry_bounds import Sights, Told, at_once, bounds, displacements_between, observability, sampled
 from estimators.core.types import Array
 
 NOISE = OdometryNoise(forward=0.01, starboard=0.003, heading=2e-4, position=0.02)
@@ -183,3 +183,32 @@ def test_displacements_of_samples_add_up():
     for f, h in ((2.0, 0.2), (3.0, 0.3)):
         whole = whole.extended(f, 0.0, h, 1.0, NOISE)
     assert summed[1] == pytest.approx(np.array(whole), rel=1e-12)
+
+
+def test_told_places_err_from_packet_to_packet():
+    """Two leaders in turn whose errors last, without odometry noise: generalised least squares."""
+    k, prior = 9, SPACE.vector({"north": 5.0, "east": 8.0, "current_north": 0.5, "current_east": 0.7}) ** 2
+    times, rows, beacon = mission(k)
+    rows = np.column_stack((rows[:, :3], np.zeros((k, 3))))
+    numbers = np.array([0, 1, 0, 0, 1, 1, 0, 1, 0])
+    kept, added = np.linspace(0.9, 0.5, k), np.linspace(4.0, 0.3, k)
+    relative = np.concatenate((way(rows) - beacon[:, :2], beacon[:, 2:]), axis=1)
+    sights = at_once(times, rows, range_deviation=0.4)._replace(told=Told(numbers, kept, added))
+    (found,) = bounds(np.diag(prior), sights, relative[None, None], np.array([k - 1]))
+    covariance = np.zeros((k, k))  # of an error along one axis, at each sight
+    for leader in (0, 1):
+        of = np.flatnonzero(numbers == leader)
+        variance = 0.0
+        for a, i in enumerate(of):
+            variance = added[i] + (kept[i] ** 2 * variance if a else 0.0)
+            left = 1.0
+            covariance[i, i] = variance
+            for j in of[a + 1 :]:
+                left *= kept[j]
+                covariance[i, j] = covariance[j, i] = left * variance
+    sight = relative[:, :2] / np.linalg.norm(relative, axis=1, keepdims=True)
+    S = 0.16 * np.eye(k) + covariance * (sight @ sight.T)
+    H = np.hstack((sight, sight * times[:, None]))
+    start = np.linalg.inv(np.diag(1.0 / prior[:4]) + H.T @ np.linalg.solve(S, H))
+    F = np.block([[np.eye(2), times[-1] * np.eye(2)], [np.zeros((2, 2)), np.eye(2)]])
+    assert found[0, :4, :4] == pytest.approx(F @ start @ F.T, rel=1e-7)
