@@ -131,10 +131,11 @@ def _camera(target: Array, distance: float, azimuth: float, elevation: float) ->
 
 
 def _overview(playback: Playback, tangents: Array) -> mujoco.MjvCamera:
-    """The camera from which all tracks and docks fill the picture best, of all azimuths."""
+    """The camera from which all tracks, docks and beacons fill the picture best, of all azimuths."""
     around = 15.0 * np.array([[1, 1, 0], [1, -1, 0], [-1, 1, 0], [-1, -1, 0]])
     tracks = [motion.positions for motion in playback.motions.values()]
-    places = [dock.mouth for dock in playback.docks.values()] or [track[0] for track in tracks]
+    places = [*(dock.mouth for dock in playback.docks.values()), *playback.beacons.values()]
+    places = places or [track[0] for track in tracks]
     points = np.concatenate([*tracks, *(place + around for place in places)])
     # Of nearly equal ones the one in which north points most upwards: azimuth 0 looks north.
     fits = [_fitted(points, azimuth, TILT, tangents) for azimuth in range(-180, 180, 15)]

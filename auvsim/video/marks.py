@@ -22,6 +22,7 @@ REFUSED: Colour = (1.0, 0.15, 0.1, 1.0)
 CURRENT: Colour = (0.45, 0.95, 1.0, 1.0)
 DOCK: Colour = (1.0, 0.55, 0.2, 1.0)
 MOTE: Colour = (0.75, 0.92, 0.92, 1.0)
+BEACON: Colour = (0.72, 0.53, 0.04, 1.0)
 
 FLEET: tuple[Colour, ...] = (  # of several vehicles, each with colours of its own
     TRUE, (0.35, 0.9, 0.2, 1.0), (0.62, 0.45, 1.0, 1.0), (0.95, 0.5, 0.5, 1.0), (0.3, 0.6, 1.0, 1.0)
@@ -164,6 +165,7 @@ class FarMarks:
         self._floor = playback.model.geom("sea_floor").pos[2]
         self._stations = _stations(playback, unit)
         self._pulses = Pulses(playback)
+        self._beacons = [*playback.beacons.values()]
 
     def update(self, moment: Moment) -> None:
         """Draws the moment."""
@@ -179,6 +181,8 @@ class FarMarks:
                 _ellipse(layer, now.belief, 0.02 * unit)
                 layer.ball((0.5 * unit,) * 3, now.belief.position, np.eye(3), ESTIMATE)
             layer.join(ARROW, 0.6 * unit, now.position - forward, now.position + forward, tracks.colour)
+        for place in self._beacons:
+            layer.ball((0.9 * unit,) * 3, place, np.eye(3), BEACON)
         self._pulses.draw(layer, moment.time)
         self._flow(moment.followed.current)
 

@@ -152,7 +152,11 @@ def _legend(on: Panel, playback: Playback, moment: Moment) -> None:
         ("true track", true, 14),
         ("estimate, 2σ", [marks.ESTIMATE], 14),
         *((("dock and axis", [marks.DOCK], 14),) if playback.docks or not playback.talks else ()),
-        *((("heard, lost", [HEARD, LOST], 14),) if playback.talks and not playback.docks else ()),
+        *(
+            (("heard, lost", [HEARD, LOST], 14),)
+            if playback.talks and not (playback.docks and playback.hears_fixes)
+            else ()
+        ),
         *((("fix", [marks.FIX], 7), (refused, [marks.REFUSED], 7)) if playback.hears_fixes else ()),
         ("current", [marks.CURRENT], 14),
     )

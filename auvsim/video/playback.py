@@ -71,6 +71,7 @@ class Playback:
                 plan.rates.physics,
             )
         self.model, self._vehicles = scene.model, scene.vehicles
+        self.fixed_modems = {name: flip(np.array(fixed.place)) for name, fixed in plan.fixed_modems.items()}
         scenery.paint_sea_floor(self.model)
         scenery.widen(self.model, max(float(np.abs(m.positions[:, :2]).max()) for m in self.motions.values()))
         self.data = mujoco.MjData(self.model)
@@ -91,6 +92,11 @@ class Playback:
         places = [int(model.jnt_qposadr[int(actuators[k].trnid[0])]) for k in hinged]
         turning = np.array([actuation.units[k] == "rad/s" for k in hinged], dtype=bool)
         return int(model.joint(f"{name}/").qposadr[0]), places, hinged, turning
+
+    @property
+    def beacons(self) -> dict[str, Array]:
+        """Places (3,) [m] of modems that are neither on a vehicle nor on a dock, in MuJoCo's world."""
+        return {name: place for name, place in self.fixed_modems.items() if name not in self.docks}
 
     @property
     def talks(self) -> bool:

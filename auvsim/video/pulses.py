@@ -35,33 +35,38 @@ class Pulses:
 
     def __init__(self, playback: Playback) -> None:
         rows = playback.log.groups["network/messages"]
+        known = playback.motions.keys() | playback.fixed_modems.keys()
         found: dict[tuple[float, str], list[tuple[str, bool]]] = {}
         for time, source, destination, kind, fate in zip(
             *(rows[name].tolist() for name in ("time", "source", "destination", "kind", "fate")), strict=True
         ):
-            if kind != "usbl" and fate != UNDER_WAY and {source, destination} <= playback.motions.keys():
+            if kind != "usbl" and fate != UNDER_WAY and {source, destination} <= known:
                 found.setdefault((time, source), []).append((destination, fate == DELIVERED))
-        self._motions = playback.motions
-        self._pulses = [Pulse(sent=t, source=s, fates=tuple(f)) for (t, s), f in sorted(found.items())]
-        self._times = np.array([pulse.sent for pulse in self._pulses])
+        self._motions, self._fixed = playback.motions, playback.fixed_modems
+        self.shown = [Pulse(sent=t, source=s, fates=tuple(f)) for (t, s), f in sorted(found.items())]
+        self._times = np.array([pulse.sent for pulse in self.shown])
         self._round = np.linspace(0.0, math.tau, CORNERS + 1)
 
     def draw(self, layer: Layer, time: float) -> None:
         """Draws the pulses of the last seconds before a time [s]."""
         first, last = np.searchsorted(self._times, (time - LIFE, time), side="right")
-        for pulse in self._pulses[max(first, last - MOST) : last]:
+        for pulse in self.shown[max(first, last - MOST) : last]:
             self._one(layer, pulse, (time - pulse.sent) / LIFE)
 
     def _one(self, layer: Layer, pulse: Pulse, age: float) -> None:
         """One of an age from 0 to 1."""
-        origin = self._motions[pulse.source].at(pulse.sent).position
-        ends = {name: self._motions[name].at(pulse.sent).position for name, _ in pulse.fates}
+        origin = self._place(pulse.source, pulse.sent)
+        ends = {name: self._place(name, pulse.sent) for name, _ in pulse.fates}
         distances = {name: float(np.linalg.norm(end - origin)) for name, end in ends.items()}
         radius = age * BEYOND * max(distances.values())
         self._ring(layer, origin, radius, (*RING[:3], 1.0 - age))
         for name, heard in pulse.fates:
             if radius >= distances[name]:
                 layer.join(LINE, 4.0, origin, ends[name], (*(HEARD if heard else LOST)[:3], 1.0 - 0.7 * age))
+
+    def _place(self, name: str, time: float) -> Array:
+        """Where a modem is (3,) [m] at a time [s]: of a vehicle, a dock or a beacon."""
+        return self._fixed[name] if name in self._fixed else self._motions[name].at(time).position
 
     def _ring(self, layer: Layer, centre: Array, radius: float, colour: Colour) -> None:
         corners = centre + radius * np.stack([np.cos(self._round), np.sin(self._round), 0.0 * self._round], axis=1)

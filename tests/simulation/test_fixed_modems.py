@@ -16,6 +16,8 @@ from auvsim.navigation.odometry import required
 from auvsim.simulation import building, scenario
 from auvsim.simulation.fixed_stations import FixedStation
 from auvsim.simulation.run import run
+from auvsim.video.playback import Playback
+from auvsim.video.pulses import Pulses
 
 BUOY = {"north": 250.0, "east": 150.0, "depth": 30.0, "modem": {"tell": {"period": 12.0, "phase": 1.0}}}
 HOME = {"north": 150.0, "east": -300.0, "depth": 20.0, "heading_deg": 30.0,
@@ -151,3 +153,16 @@ def test_a_follower_without_anyone_to_hear_is_told_what_may_help():
 
     with pytest.raises(InputError, match="another vehicle, a structure or a beacon with a modem"):
         required(Setup())  # pyright: ignore[reportArgumentType]
+
+
+def test_the_video_shows_the_pulse_of_each_sender(log):
+    """Every packet of a modem is a ring from where its sender was, dock and beacon included."""
+    playback = Playback(log)
+    found = Pulses(playback).shown
+    rows = log.groups["network/messages"]
+    decided = (rows["kind"] != "usbl") & (rows["fate"] != "under way")
+    sent = {*zip(rows["time"][decided].tolist(), rows["source"][decided].tolist(), strict=True)}
+    assert {(pulse.sent, pulse.source) for pulse in found} == sent
+    assert {pulse.source for pulse in found} == {"leader", "buoy", "home"}
+    assert playback.fixed_modems["buoy"] == pytest.approx((250.0, -150.0, -30.0))  # MuJoCo's axes: north, west, up
+    assert [*playback.beacons] == ["buoy"]
