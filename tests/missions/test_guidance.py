@@ -254,6 +254,53 @@ def test_gives_up_after_the_last_attempt() -> None:
     assert kinds == ["homing", *["approach", "final", "go_around"] * 2, "approach", "final", "aborted"]
 
 
+def test_an_approach_that_is_broken_off_in_time_is_no_attempt_so_often_as_set() -> None:
+    """Twice too uncertain at 5 m with one return to spend: the first costs no attempt, the second does."""
+    script = Script(new(DockingSettings(returns=1)))
+    for attempt, reason in ((1, "attempt 1 anew"), (2, "attempt 2 follows")):
+        for along, cross in ((-250.0, 0.0), (-190.0, 0.0), (-100.0, 20.0), (-15.0, 0.0)):
+            script.tick(along, cross)
+        script.tick(-5.0, sigma=1.5)
+        assert script.last[0] == "go_around"
+        assert script.last[1] == f"chance of 38 %, off-axis position uncertain by 1.5 m; {reason}"
+        assert script.guidance.attempt == attempt
+
+
+def paced(speed_of_current: float, number: int = 8, interval: float = 8.0) -> tuple[float, float]:
+    """Setpoint of speed and its pace, 60 m before the mouth, the last of some packets just heard.
+
+    Args:
+        speed_of_current: Deviation of the current [m/s].
+        number: Of packets heard.
+        interval: Between them [s].
+    """
+    guidance = new(DockingSettings(approach_speed=1.5))
+    for k in range(number):
+        time = interval * k
+        guidance._reports.observe([Reading("usbl", time, time, fix(time).value, k)])
+        here = estimate(time, (-250.0, -190.0)[min(k, 1)] - NOSE, 0.0, 0.0, speed=1.5)
+        update(guidance, time, here, 0.0, DOCK_DEPTH)
+    assert guidance.phase == Phase.APPROACH
+    here = guidance._here._replace(along=-60.0, cross=0.0, north=-60.0, east=0.0, unsteadiness=speed_of_current)
+    found = guidance._follow_line(interval * (number - 1), here).speed
+    return found, guidance._speed(here)
+
+
+def test_in_unsteady_water_a_fix_is_met_before_the_mouth() -> None:
+    """Within 1.5 times the speed that it has anyhow, and so that a whole number of intervals leads to 11 m before."""
+    speed, least = paced(0.12)
+    assert least <= speed <= 1.5 * least
+    count = 49.0 / speed / 8.0
+    assert count == pytest.approx(round(count), abs=1e-9)
+    assert 49.0 / (1.5 * least) > 8.0 * (round(count) - 1)  # the one before is out of reach
+
+
+def test_in_steady_water_the_speed_is_as_ever() -> None:
+    """0.09 m/s for 8 s is less than the mouth's radius; and a single packet tells no interval."""
+    for speed, least in (paced(0.09), paced(0.12, interval=6.0), paced(0.0)):
+        assert speed == least
+
+
 @pytest.mark.parametrize("fixed", [True, False])
 def test_gives_up_when_lost(fixed: bool) -> None:
     """No fix for `lost_timeout`, whether there ever was one or not."""

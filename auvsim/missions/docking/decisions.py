@@ -9,6 +9,7 @@ from auvsim.missions.docking.settings import DockingSettings
 DEPTH_LENGTH = 8.0  # way on which the depth control takes a small error down to 1/e [m]
 LEVEL_OUT = 15.0  # way before the mouth by which the vehicle is to be level [m]
 NO_RETURN = 4.0  # distance before the mouth from which a vehicle no longer stops before it [m]
+COMMITS = 6.0  # distance before the mouth at which it decides whether to go in [m]
 PASSED = (
     2.5  # distance behind the latch at which it is passed, though friction in the funnel is no part of the model [m]
 )
@@ -28,6 +29,12 @@ class PredictedMiss(NamedTuple):
         across = max(abs(self.cross) - k * self.cross_deviation, 0.0)
         down = max(abs(self.below) - k * self.below_deviation, 0.0)
         return math.hypot(across, down) > radius
+
+    def chance_within(self, radius: float) -> float:
+        """Probability that the nose passes within a radius [m] across, by the part of it that the depth leaves."""
+        half = math.sqrt(max(radius**2 - self.below**2, 0.0))
+        scale = math.sqrt(2.0) * max(self.cross_deviation, 1e-9)
+        return 0.5 * (math.erf((half - self.cross) / scale) + math.erf((half + self.cross) / scale))
 
 
 def predicted_miss(here: Relative, lookahead: float) -> PredictedMiss:
@@ -81,7 +88,7 @@ class SoFar(NamedTuple):
     silence: float  # time since a fix was last of use [s]
     uncertain: float  # time for which the last metres were more uncertain across the axis than the mouth is wide [s]
     final: float | None  # time since the last metres began [s]; None before
-    last: bool  # whether no further attempt follows
+    last: bool  # whether nothing follows if this approach is broken off
 
 
 def reason_to_break_off(
@@ -105,10 +112,14 @@ def reason_to_break_off(
         return None
     if s.uncertain_timeout is not None and so_far.uncertain > s.uncertain_timeout:
         return f"off-axis position uncertain by more than the mouth's radius for {so_far.uncertain:.0f} s"
-    if -2.0 * NO_RETURN < here.along < -NO_RETURN and not so_far.last and here.cross_deviation > 2.0 * mouth_radius:
-        return f"off-axis position uncertain by {here.cross_deviation:.1f} m"
     if -2.0 * NO_RETURN < here.along < 0.0:
         miss = predicted_miss(here, s.lookahead)
+        # An unsteady current may have done since the last fix what a filter in a calm mode does not reckon with.
+        spread = math.hypot(miss.cross_deviation, here.unsteadiness * so_far.silence)
+        chance = miss._replace(cross_deviation=spread).chance_within(mouth_radius)
+        least = s.least_chance if here.along > -COMMITS else 0.5 * s.least_chance
+        if here.along < -NO_RETURN and not so_far.last and chance < least:
+            return f"chance of {100.0 * chance:.0f} %, off-axis position uncertain by {spread:.1f} m"
         if miss.certain_beyond(mouth_radius):
             return f"would miss the entrance by {math.hypot(miss.cross, miss.below):.2f} m"
     if here.along > -0.5 and abs(here.cross) > mouth_radius + 0.5:

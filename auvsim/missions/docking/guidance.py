@@ -17,7 +17,7 @@ from auvsim.control.controller import Setpoints
 from auvsim.data.log import VehicleLog
 from auvsim.missions.docking import path, speeds
 from auvsim.missions.docking.columns import COLUMNS, VARIABLES
-from auvsim.missions.docking.decisions import SoFar, above_or_below, not_ready, reason_to_break_off
+from auvsim.missions.docking.decisions import NO_RETURN, SoFar, above_or_below, not_ready, reason_to_break_off
 from auvsim.missions.docking.heard import Heard
 from auvsim.missions.docking.jam import jam_watch
 from auvsim.missions.docking.metrics import docking_metrics
@@ -35,7 +35,9 @@ __all__ = ["CLEAR", "Docking", "DockingSettings", "Phase", "approach_course", "f
 
 BACKING = 60.0  # longest time of backing out [s]
 FREEING = 20.0  # time of backing away from what holds the vehicle [s]
-RETURNS = 2  # times that the vehicle goes back to a gate without an attempt being counted
+EARLY = 4.0  # deviation across the axis by the mouth's radius with which the last metres are not begun
+MEETS = 11.0  # distance before the mouth at which a fix is to come in unsteady water [m]
+HURRY = 1.5  # highest factor on the speed over ground for that
 FASTER = 0.3  # by how much homing is faster than an approach in a strong current [m/s]
 UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
 STEADY = 0.05  # deviation of a current that counts as known [m/s]
@@ -84,6 +86,7 @@ class Docking(Mission):
         self._phase_start = 0.0
         self._nearest = (math.inf, 0.0)  # least distance to the gate [m] and when that was [s]
         self._paced: tuple[Relative | None, int, float] = (None, 0, 0.0)  # place and attempt of the last speed, and it
+        self._pace = 1.0  # factor on the speed over ground of an approach, for a fix to come in time
         self._occupant: str | None = None  # another vehicle in the dock, as reported in its packets
 
     @property
@@ -185,7 +188,8 @@ class Docking(Mission):
             reason = held or self._reason_to_break_off(time, here)
             if held:
                 self._backs_until = time + FREEING
-            heading, depth, speed, rudder = self._break_off(time, here, reason) if reason else self._follow_line(here)
+            following = self._break_off(time, here, reason) if reason else self._follow_line(time, here)
+            heading, depth, speed, rudder = following
             stands = self.phase == Phase.APPROACH and not self._comes_nearer(time, -here.along)
             if stands:
                 reason = self._too_strong(here, True) or f"no progress, {-here.along:.0f} m before the entrance"
@@ -285,14 +289,31 @@ class Docking(Mission):
             return None
         return f"current too strong for this vehicle: {current:.2f} m/s, it makes {self._fastest:.2f} m/s"
 
-    def _follow_line(self, here: Relative) -> Setpoints:
+    def _timed(self, time: float, here: Relative, speed: float) -> float:
+        """The speed through the water [m/s] with which a fix is due where it still helps; that of `speed` or more.
+
+        In unsteady water the position is lost between two fixes, so that it matters how old the last one is at the
+        mouth. Close before that place the pace stays as it is.
+        """
+        interval, way = self._reports.interval, -here.along - MEETS
+        if interval is None or here.unsteadiness * interval < self._mouth_radius:
+            self._pace = 1.0
+            return speed
+        slow = max(speeds.ground_speed_along(self._line(here), speed, here.current), speeds.SLOWEST)
+        if way > 0.5 * MEETS:
+            wait = self._reports.due(time, way / (HURRY * slow), interval)
+            self._pace = min(max(way / (wait * slow), 1.0), HURRY)
+        crab = math.radians(self._s.crab_limit_deg)
+        return speeds.speed_through_water(speed, here.axis, here.current, self._pace * slow, crab, self._fastest)
+
+    def _follow_line(self, time: float, here: Relative) -> Setpoints:
         """Along the approach line, by line of sight."""
         speed, line = self._speed(here), self._line(here)
         # Cross-track error from the line of course `line` through the centre of the mouth, positive to starboard.
         error = cross_track(line, here.north, here.east)
         offset, slope = self._weave.at(here.north * math.cos(line) + here.east * math.sin(line))
         course = course_to_line(line + math.atan(slope), error - offset, self._s.lookahead)
-        return self._on_course(here, course, speed)
+        return self._on_course(here, course, self._timed(time, here, speed))
 
     def _planned_weave(self, estimate: Estimate, here: Relative) -> Weave:
         """The weave of an approach that begins."""
@@ -313,22 +334,23 @@ class Docking(Mission):
         if here.cross_deviation <= self._mouth_radius or self.phase != Phase.FINAL:
             self._certain = time
         begins = self.phase == Phase.APPROACH and here.along > -self._s.final_distance
-        if begins and here.cross_deviation > self._mouth_radius and self._returns < RETURNS:
+        if begins and here.cross_deviation > EARLY * self._mouth_radius and self._returns < self._s.returns:
             return f"off-axis position uncertain by {here.cross_deviation:.1f} m"
         if begins:
             text = f"{-here.along:.0f} m before the entrance, {here.cross:+.2f} m off the axis, "
             self._enter(Phase.FINAL, time, text + above_or_below(here.below))
         final = self.phase == Phase.FINAL
+        last = self.attempt >= self._s.attempts and self._returns >= self._s.returns
         so_far = SoFar(
             silence=self._reports.silence(time), uncertain=time - self._certain,
-            final=time - self._phase_start if final else None, last=self.attempt >= self._s.attempts,
+            final=time - self._phase_start if final else None, last=last,
         )  # fmt: skip
         return reason_to_break_off(here, so_far, self._s, self._mouth_radius, self._latched)
 
     def _break_off(self, time: float, here: Relative, reason: str) -> Setpoints:
-        """Ends an attempt; before the last metres it does not count as one."""
+        """Ends an attempt; before the point of no return it does not count as one, so often as the settings say."""
         self._side = math.copysign(1.0, here.cross)
-        if self.phase == Phase.APPROACH and self._returns < RETURNS:
+        if (self.phase == Phase.APPROACH or here.along < -NO_RETURN) and self._returns < self._s.returns:
             self._returns += 1
             self._enter(Phase.GO_AROUND, time, f"{reason}; attempt {self.attempt} anew")
         elif self.attempt >= self._s.attempts:

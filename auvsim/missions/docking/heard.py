@@ -1,12 +1,14 @@
 """What a vehicle hears of its dock, and how much of it was of use to the estimator."""
 
-from collections import Counter
+import math
+from collections import Counter, deque
 from collections.abc import Sequence
 
 from auvsim.base.reading import Reading
 from auvsim.missions.docking.reports import DockReports
 from auvsim.navigation.estimate import Estimate
 
+NUMBERED = 8  # packets that tell the time between two
 FIXES = ("usbl", "fix", "range")  # kinds of measurement that tell where the vehicle is
 
 
@@ -24,11 +26,15 @@ class Heard(DockReports):
         self._used = 0.0  # when the estimator last accepted a fix [s]
         self._judges = False  # whether the estimator says what it accepts
         self._seen = float("-inf")  # time of the last estimate looked at [s]
+        self._arrivals: deque[tuple[int, float]] = deque(maxlen=NUMBERED)  # number and time of the dock's packets [s]
         self._refused: Counter[str] = Counter()  # fixes refused since one was last accepted, by reason
 
     def observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's packets and the ranges among readings."""
         super().observe(readings)
+        for reading in readings:
+            if reading.sensor == "usbl":
+                self._arrivals.append((reading.sequence, reading.received))
         if self._ranges:
             self.last = max([self.last, *(r.received for r in readings if r.sensor in self._ranges)])
 
@@ -49,6 +55,19 @@ class Heard(DockReports):
     def silence(self, time: float) -> float:
         """Time since a fix was last of use [s]."""
         return time - (self._used if self._judges else self.last)
+
+    @property
+    def interval(self) -> float | None:
+        """Time from one packet of the dock to the next, lost ones included [s]; None until there are two."""
+        if len(self._arrivals) < 2 or self._arrivals[-1][0] <= self._arrivals[0][0]:
+            return None
+        (first, begin), (last, end) = self._arrivals[0], self._arrivals[-1]
+        return (end - begin) / (last - first)
+
+    def due(self, time: float, wait: float, interval: float) -> float:
+        """Time from now at which the first packet after a wait [s] is due, at an interval [s]."""
+        last = self._arrivals[-1][1] - time
+        return last + (math.floor((wait - last) / interval) + 1) * interval
 
     def lost(self, time: float) -> str:
         """Why there was none for so long."""

@@ -180,7 +180,7 @@ CHECKS: tuple[tuple[str, Check], ...] = (
     (rf"current too strong for this vehicle: {NUMBER} m/s, it makes {NUMBER} m/s", _too_strong),
     (rf"no progress, {NUMBER} m (from the gate|before the entrance)", _no_progress),
     (rf"{NUMBER} m (above|below) the dock", _depth),
-    (rf"(?:off-axis position|position across the axis) uncertain by {NUMBER} m", _uncertain),
+    (rf"(?:chance of \d+ %, )?(?:off-axis position|position across the axis) uncertain by {NUMBER} m", _uncertain),
     (rf"would miss the entrance by {NUMBER} m", _would_miss),
     (rf"entrance missed by {NUMBER} m", _missed),
     (r"entrance passed without capture", _passed),

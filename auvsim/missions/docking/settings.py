@@ -66,6 +66,18 @@ class DockingSettings(Settings):
     )
     final_distance: float = Field(default=20.0, gt=0, description="distance at which the last metres begin [m]")
     attempts: int = Field(default=3, ge=1, le=1000, description="attempts before the vehicle gives up")
+    returns: int = Field(
+        default=6,
+        ge=0,
+        le=1000,
+        description="approaches that may be broken off before the point of no return without an attempt being counted",
+    )
+    least_chance: float = Field(
+        default=0.5,
+        ge=0,
+        lt=1,
+        description="least foretold chance to pass the mouth's plane within its radius for which it goes in [-]",
+    )
     fix_timeout: float | None = Field(
         default=None,
         gt=0,
