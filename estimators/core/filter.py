@@ -13,6 +13,7 @@ from estimators.core.outliers import correct as correct_mixture
 from estimators.core.recovery import PROBABLE, REMEMBERED, Readmission, Recovery, Rejected
 from estimators.core.types import (
     NO_MODEL,
+    Array,
     Gaussian,
     Measurement,
     MeasurementModel,
@@ -177,11 +178,14 @@ def _recovered(
     belief = recovery.recover(state.belief, earlier, now, model)
     if recovery.fuses_both:
         return FilterState(belief, state.outliers - confirmed, rest, now.innovation, (*accepted, earlier.taken))
-    # What is remembered of the source is from now on seen from the belief that has followed it.
-    moved = belief.mean - state.belief.mean
     suspect = (*of_source(state.rejected, now.measurement)[2 - REMEMBERED :], now)
-    seen_anew = (r._replace(residual=r.residual - r.H @ moved) for r in suspect)
-    return FilterState(belief, state.outliers, (*rest, *seen_anew), now.innovation, accepted)
+    anew = seen_anew(suspect, belief.mean - state.belief.mean)
+    return FilterState(belief, state.outliers, (*rest, *anew), now.innovation, accepted)
+
+
+def seen_anew(suspect: Sequence[Rejected], moved: Array) -> list[Rejected]:
+    """What is remembered of a source, from a belief that has followed it by a step (n,)."""
+    return [r._replace(residual=r.residual - r.H @ moved) for r in suspect]
 
 
 def of_source(rejected: tuple[Rejected, ...], m: Measurement) -> tuple[Rejected, ...]:

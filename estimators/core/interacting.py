@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -10,10 +11,10 @@ from estimators.core import ekf, imm, loops, outliers
 from estimators.core.consistency import chi_square
 from estimators.core.ekf import Innovation
 from estimators.core.errors import ParameterError
-from estimators.core.filter import OUTLIER, Start, of_source, without
+from estimators.core.filter import OUTLIER, Start, of_source, seen_anew, without
 from estimators.core.history import Input, Node
 from estimators.core.outliers import MixtureUpdate, Outliers
-from estimators.core.recovery import PROBABLE, REMEMBERED, Recovery, Rejected, opened
+from estimators.core.recovery import PROBABLE, REMEMBERED, Readmission, Recovery, Rejected, opened
 from estimators.core.types import (
     NO_MODEL,
     Array,
@@ -73,7 +74,8 @@ class InteractingModelFilter:
 
     Measurements of the kinds in `mixtures` are weighed against being outliers in each mode, and weigh the modes. Modes
     change at constant rates, however often measurements come: right after one, by what the time since the one before
-    it allows. Other kinds say nothing of the modes and are fused in each.
+    it allows. Other kinds say nothing of the modes and are fused in each; those in `gates` only if the merged belief
+    explains them, or if a source's rejected ones agree with each other, as in a `ModelFilter`.
 
     A filter that takes good measurements for outliers, because it is wrong itself, is set right by measurements that
     agree against it: by two if it has taken fewer than three, as after a wrong first one, else by three. Wrong ones may
@@ -87,7 +89,9 @@ class InteractingModelFilter:
         switching: (m, m) rates of changing from mode i (row) to mode j (column) [1/s]; the diagonal is not read.
         initial: Probabilities of the modes at first (m,).
         mixtures: Model of outliers, by kind.
-        recovery: What to do about measurements that are rejected again and again.
+        recovery: What to do about measurements of `mixtures` that are rejected again and again.
+        gates: Probability with which a measurement that fits is accepted, by kind; none: no gate.
+        readmission: What to do about measurements of `gates` that are.
         echo: Time for which wrong measurements may agree, as false echoes do [s]: none is let in before, and a
             velocity is told from two that lie `APART`.
         blended: The process that stands for all modes of given probabilities, for smoothing; None: the most probable's.
@@ -106,6 +110,8 @@ class InteractingModelFilter:
         initial: Sequence[float],
         mixtures: Mapping[str, Outliers],
         recovery: Recovery,
+        gates: Mapping[str, float] = MappingProxyType({}),
+        readmission: Recovery = Readmission(),  # noqa: B008 - immutable
         echo: float = 0.0,
         blended: Callable[[Array], ProcessModel] | None = None,
     ) -> None:
@@ -116,6 +122,7 @@ class InteractingModelFilter:
         if not (shaped and abs(self._initial.sum() - 1.0) < 1e-9):
             raise ParameterError(f"initial {list(initial)} must be {len(processes)} probabilities above 0 of sum 1")
         self._mixtures, self._recovery, self._blended = dict(mixtures), recovery, blended
+        self._gates, self._readmission = dict(gates), readmission
         self._echo = echo
         self._angles = self._processes[0].angles
         together = getattr(processes[0], "together", None)
@@ -153,10 +160,10 @@ class InteractingModelFilter:
                 state = state.with_beliefs(state.means, state.covariances, verdicts)
             elif measurement.kind in self._mixtures:
                 state = self._weighed(state, measurement, model)
+            elif measurement.kind in self._gates:
+                state = self._gated(state, measurement, model, self._gates[measurement.kind])
             else:
-                means, covariances, nis = _fused(state, measurement, model)
-                verdict = (measurement, "", nis[int(state.weights.argmax())])
-                state = state.with_beliefs(means, covariances, (*state.verdicts, verdict))
+                state = _taken(state, measurement, model)
         return state
 
     def process_after(self, state: InteractingState) -> ProcessModel:
@@ -171,6 +178,27 @@ class InteractingModelFilter:
         return imm.stacked(
             [ekf.predict(Gaussian(mean=x, covariance=P), process, u, duration) for x, P, process in modes]
         )
+
+    def _gated(
+        self, state: InteractingState, measurement: Measurement, model: MeasurementModel, gate: float
+    ) -> InteractingState:
+        before = state.belief
+        innovation = ekf.correct(before, measurement, model, gate)[1]
+        own = of_source(state.rejected, measurement)
+        fits = innovation.accepted and innovation.nis <= chi_square(PROBABLE, innovation.residual.size)
+        if innovation.accepted and (fits or not own):
+            return _taken(state, measurement, model)._replace(rejected=without(state.rejected, own))
+        H = model.jacobian(before.mean, measurement)
+        now = Rejected(measurement, innovation.residual, H, innovation.nis, innovation)
+        suspect, rest = (*own[1 - REMEMBERED :], now), without(state.rejected, own)
+        if self._readmission.suffice(now, own, self._readmission.agreeing(now, own)):
+            taken = _taken(state, measurement, model)
+            anew = seen_anew(suspect, taken.belief.mean - before.mean)
+            return taken._replace(rejected=(*rest, *anew))
+        if innovation.accepted:
+            return _taken(state, measurement, model)._replace(rejected=rest)
+        verdicts = (*state.verdicts, (measurement, OUTLIER, innovation.nis))
+        return state._replace(rejected=(*rest, *suspect), outliers=state.outliers + 1, verdicts=verdicts)
 
     def _weighed(self, state: InteractingState, fix: Measurement, model: MeasurementModel) -> InteractingState:
         mixture = self._mixtures[fix.kind].after(state.wrong, state.seen)
@@ -224,6 +252,13 @@ class InteractingModelFilter:
             means, covariances, verdicts, following, fix.stamp, accepted, count, rejected, innovation, self._angles,
             last_accepted, wrong, seen,
         )  # fmt: skip
+
+
+def _taken(state: InteractingState, measurement: Measurement, model: MeasurementModel) -> InteractingState:
+    """State after a measurement that says nothing of the modes."""
+    means, covariances, nis = _fused(state, measurement, model)
+    verdict = (measurement, "", nis[int(state.weights.argmax())])
+    return state.with_beliefs(means, covariances, (*state.verdicts, verdict))
 
 
 def _fused(

@@ -33,6 +33,7 @@ class InteractingFilter(InteractingModelFilter):
         outliers: Model of outliers among the fixes.
         echo: Time for which a false echo may show one place, which is no jump of the vehicle [s].
         doubtful: Allow for a first fix that is an outlier in the covariance at the start.
+        gate: Probability with which a measurement of the `aids` that fits is accepted; None accepts all.
         **options: See `PlanarModels`.
     """
 
@@ -47,6 +48,7 @@ class InteractingFilter(InteractingModelFilter):
         outliers: Outliers | None = None,
         echo: float = 0.0,
         doubtful: bool = False,
+        gate: float | None = 0.999,
         **options: Unpack[ModelOptions],
     ) -> None:
         self.parameters, self.noise = parameters, noise
@@ -74,6 +76,7 @@ class InteractingFilter(InteractingModelFilter):
             initial=initial,
             mixtures={USBL: mixture},
             recovery=FixRecovery(noise, echo),
+            gates={key if isinstance(key, str) else key[0]: gate for key in models.aids} if gate else {},
             echo=echo,
             blended=blended,
         )

@@ -35,8 +35,9 @@ __all__ = ["CLEAR", "Docking", "DockingSettings", "Phase", "approach_course", "f
 
 BACKING = 60.0  # longest time of backing out [s]
 FREEING = 20.0  # time of backing away from what holds the vehicle [s]
-EARLY = 4.0  # deviation across the axis by the mouth's radius with which the last metres are not begun
+EARLY = 4.0  # deviation across the axis by the mouth's radius with which the last metres are begun if a fix is to come
 MEETS = 11.0  # distance before the mouth at which a fix is to come in unsteady water [m]
+OFTEN = 6.5  # time between fixes so frequent that one comes there anyway [s]
 HURRY = 1.5  # highest factor on the speed over ground for that
 FASTER = 0.3  # by how much homing is faster than an approach in a strong current [m/s]
 UNSTEADY_GAIN = 10.0  # how much faster for each m/s by which the current is uncertain beyond that [-]
@@ -289,14 +290,24 @@ class Docking(Mission):
             return None
         return f"current too strong for this vehicle: {current:.2f} m/s, it makes {self._fastest:.2f} m/s"
 
-    def _timed(self, time: float, here: Relative, speed: float) -> float:
-        """The speed through the water [m/s] with which a fix is due where it still helps; that of `speed` or more.
+    def _meets_fix(self, here: Relative) -> float | None:
+        """Time between two fixes [s] of which one is to be met shortly before the mouth; None where none need be.
 
         In unsteady water the position is lost between two fixes, so that it matters how old the last one is at the
-        mouth. Close before that place the pace stays as it is.
+        mouth; unless they are so frequent that one comes there anyway.
         """
-        interval, way = self._reports.interval, -here.along - MEETS
-        if interval is None or here.unsteadiness * interval < self._mouth_radius:
+        interval = self._reports.interval
+        if interval is None or interval < OFTEN or here.unsteadiness * interval < 0.5 * self._mouth_radius:
+            return None
+        return interval
+
+    def _timed(self, time: float, here: Relative, speed: float) -> float:
+        """Speed through the water [m/s], `speed` or more, for a fix to come where it still helps.
+
+        Close before that place the pace stays as it is.
+        """
+        interval, way = self._meets_fix(here), -here.along - MEETS
+        if interval is None:
             self._pace = 1.0
             return speed
         slow = max(speeds.ground_speed_along(self._line(here), speed, here.current), speeds.SLOWEST)
@@ -334,7 +345,8 @@ class Docking(Mission):
         if here.cross_deviation <= self._mouth_radius or self.phase != Phase.FINAL:
             self._certain = time
         begins = self.phase == Phase.APPROACH and here.along > -self._s.final_distance
-        if begins and here.cross_deviation > EARLY * self._mouth_radius and self._returns < self._s.returns:
+        most = self._mouth_radius * (1.0 if self._meets_fix(here) is None else EARLY)
+        if begins and here.cross_deviation > most and self._returns < self._s.returns:
             return f"off-axis position uncertain by {here.cross_deviation:.1f} m"
         if begins:
             text = f"{-here.along:.0f} m before the entrance, {here.cross:+.2f} m off the axis, "
