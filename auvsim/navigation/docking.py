@@ -17,6 +17,7 @@ from auvsim.navigation import aids
 from auvsim.navigation.estimate import DEPTH_BIAS, PLANAR_STATES, Estimate
 from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.settings import RobustSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
@@ -269,9 +270,6 @@ def robust(setup: NavigatorSetup) -> Navigator:
     The modes: steady water; gusts, which last; a turn, which is short.
     """
     s = setup.settings
-    noise = _noise(s)
-    compass = {"compass": Bias(math.radians(s.compass_bias_deg))} if s.compass_bias_deg > 0.0 else {}
-    clock = {"clock": Bias(s.dock_clock)} if s.dock_clock > 0.0 else {}
     turns, ends, gusts, calms = 1.0 / s.turn_interval, 1.0 / TURN, 1.0 / s.gust_interval, 1.0 / CALM
     rates = ((0.0, gusts, turns), (calms, 0.0, turns), (0.5 * ends, 0.5 * ends, 0.0))
     currents = (s.steady_noise, s.gust_noise, s.turning_noise)
@@ -285,7 +283,15 @@ def robust(setup: NavigatorSetup) -> Navigator:
         echo=ECHO,
         doubtful=True,
     )
-    return navigator(setup, kind, replace(noise, biases={**compass, **noise.biases, **clock}))
+    return navigator(setup, kind, steady_noise(s))
+
+
+def steady_noise(s: RobustSettings) -> DockingNoise:
+    """What `robust` assumes in steady water."""
+    noise = _noise(s)
+    compass = {"compass": Bias(math.radians(s.compass_bias_deg))} if s.compass_bias_deg > 0.0 else {}
+    clock = {"clock": Bias(s.dock_clock)} if s.dock_clock > 0.0 else {}
+    return replace(noise, current=s.steady_noise, biases={**compass, **noise.biases, **clock})
 
 
 def _interacting(setup: NavigatorSetup, biases: Mapping[str, Bias], outliers: Outliers) -> Navigator:

@@ -32,6 +32,7 @@ BIASES = {"compass_bias": "rad", "gyro_bias": "rad/s"}
 GYRO_WALK = 1e-12  # of a gyro's bias [rad2/s3]
 SPEED, TURNING = 1.0, 0.1  # what is not known at first: velocities [m/s], yaw rate [rad/s]
 GYRO_BIAS, UNKNOWN = 1e-3, 50.0  # deviations at the start: of a gyro's bias [rad/s], of a position by ranges alone [m]
+DOUBT = 10.0  # deviation of a dock's first fix, which may be an outlier, until a second one has come [m]
 
 
 class ReckoningNavigator(OverHistory):
@@ -53,6 +54,7 @@ class ReckoningNavigator(OverHistory):
         self._ranged = bool(of_kind(self._sensors, RangeSettings))
         self._dock = np.zeros(2) if setup.dock is None else setup.dock.position[:2]
         self._usbl = UsblModel(transceiver=setup.usbl.transceiver, dock_heading=math.radians(s.dock_heading_deg))
+        self._doubt = DOUBT if setup.dock is not None and setup.usbl.enabled else 0.0
         process = MotionProcess(
             motion,
             {
@@ -171,7 +173,7 @@ class ReckoningNavigator(OverHistory):
             self._compass_bias**2
         )  # it shows too much: so does the heading
         if fix is not None:
-            mean[:2], covariance[:2, :2] = fix.value, fix.covariance
+            mean[:2], covariance[:2, :2] = fix.value, fix.covariance + self._doubt**2 * np.eye(2)
         return belief, [m for m in node.measurements if m is fix or m is earlier[-1]]
 
 

@@ -12,6 +12,7 @@ from auvsim.base.errors import unknown_name
 STUDIES = {  # name of the module: its line of help
     "docking": "Random docking trials of the default plan: success, accuracy, contact, consistency of the estimate.",
     "comparison": "The same docking trials with each estimator, in steady and in turning currents.",
+    "docking_bound": "The default estimator against the Cramér-Rao bound, relative to the dock, by distance.",
     "envelope": "Docking trials outside the default plan: losses, delays, strong currents, gusts, biases, bursts.",
     "identification": "Fits of planar vehicles with known parameters: coverage, convergence, process noise.",
     "held_out": "Identification of the MuJoCo vehicle, judged by predicting manoeuvres that were held out.",

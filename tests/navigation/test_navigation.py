@@ -23,11 +23,13 @@ from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.navigation.settings import AugmentedSettings, EstimatorSettings
 from auvsim.physics import planar_fit
 from auvsim.physics.truth import StructurePose, Truth
+from auvsim.sensors.compass import CompassSettings
 from auvsim.vehicles import library
 from auvsim.vehicles.actuation import Commands
 from estimators.core.types import Measurement
 from estimators.docking.estimator import UsblFix
 from estimators.docking.noise import Bias, DockingNoise
+from estimators.docking.usbl import UsblModel
 
 DOCK = StructurePose(north=400.0, east=-300.0, depth=20.0, heading=0.7, pitch=0.05, roll=-0.04)
 MOUTH = DOCK.position[:2]
@@ -415,3 +417,35 @@ def test_constant_errors_are_states_in_their_units() -> None:
     recorder.filter.noise = DockingNoise(biases=dict.fromkeys(units, Bias(0.1)))
     states = DockingNavigator(cast(Any, recorder), library.vehicle("remus100").actuation, MOUTH).states
     assert {name: states[f"{name}_bias"] for name in units} == units
+
+
+@pytest.mark.parametrize("off", [5.0, 10.0, 20.0])
+@pytest.mark.parametrize("name", ["robust", "imm", "imm_biased", "augmented_ekf", "ukf", "dead_reckoning"])
+def test_a_first_fix_that_is_an_outlier_is_overcome(name: str, off: float) -> None:
+    """A straight course at a steady 1.1 m/s, 130 m before the mouth, with fixes every 5 s of which the first is wrong.
+
+    From the fifth on, nothing is left of it: within three deviations, and a tenth of the largest.
+    """
+    parameters = planar_fit.fit_planar_model("remus100", 1.0).parameters
+    setup = NavigatorSetup(
+        vehicle="auv", settings=TypeAdapter(EstimatorSettings).validate_python({"kind": name}), parameters=parameters,
+        actuation=library.vehicle("remus100").actuation, period=0.5, rates={"compass": 2.0}, usbl=UsblSettings(),
+        dock=DOCK, sensors={"compass": CompassSettings()} if name == "dead_reckoning" else {},
+    )  # fmt: skip
+    navigator, noise, turned = registry.build(setup), np.random.default_rng(3), rotation(DOCK.roll, DOCK.pitch, 0.7)
+    shaft, course = 130.0, np.array((math.cos(0.9), math.sin(0.9)))
+    for k in range(1, 61):
+        time = 0.5 * k
+        away = np.array((-120.0, -60.0)) + parameters.steady_surge(shaft) * time * course
+        readings = [compass(time, 0.9 + math.radians(1.0) * noise.standard_normal())]
+        if k % 10 == 0:
+            wrong = off * np.array((0.8, -0.6)) if k == 10 else 0.0
+            sigma = UsblModel().deviation(float(np.linalg.norm(away)))
+            seen = turned.T @ np.array((*(away + wrong), -2.0)) + sigma * noise.standard_normal(3)
+            value = np.array((*seen, DOCK.heading, DOCK.pitch, DOCK.roll, 20.0))
+            readings.append(Reading("usbl", time, time, value, k // 10))
+        estimate = navigator.update(time, readings, (), Commands(0.0, 0.0, shaft))
+        if k >= 50:
+            error = estimate.position[:2] - MOUTH - away
+            assert error @ np.linalg.solve(estimate.covariance[:2, :2], error) < 9.0 * 2.0
+            assert np.hypot(*error) < 2.0
