@@ -20,7 +20,7 @@ from auvsim.data.log import VehicleLog
 from auvsim.data.phases import interpolate
 from auvsim.missions.docking.dock_frame import to_body
 from auvsim.navigation.docking import navigator, steady_noise
-from auvsim.navigation.estimate import DOCK_HEADING_BIAS, PLANAR_STATES
+from auvsim.navigation.estimate import DOCK_HEADING_BIAS
 from auvsim.replay import trial_logs
 from auvsim.replay.recording import Recording
 from auvsim.simulation import sampling, scenario

@@ -281,6 +281,7 @@ def paced(speed_of_current: float, number: int = 8, interval: float = 8.0) -> tu
         here = estimate(time, (-250.0, -190.0)[min(k, 1)] - NOSE, 0.0, 0.0, speed=1.5)
         update(guidance, time, here, 0.0, DOCK_DEPTH)
     assert guidance.phase == Phase.APPROACH
+    assert guidance._here is not None
     here = guidance._here._replace(along=-60.0, cross=0.0, north=-60.0, east=0.0, unsteadiness=speed_of_current)
     found = guidance._follow_line(interval * (number - 1), here).speed
     return found, guidance._speed(here)

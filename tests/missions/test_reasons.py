@@ -64,7 +64,7 @@ def test_the_reason_for_giving_up_is_true(condition, trial, says):
 
 
 def test_a_vehicle_jammed_beside_the_funnel_says_so_and_docks_later():
-    log = flown("bad day", 6, 1)
+    log = flown("bad day", 6, 12)
     ((text, true),) = [(one.text, one.true) for one in given(log) if one.kind == "jammed"]
     assert text.startswith("beside the funnel")
     assert true

@@ -437,7 +437,7 @@ def test_a_first_fix_that_is_an_outlier_is_overcome(name: str, off: float) -> No
     for k in range(1, 61):
         time = 0.5 * k
         away = np.array((-120.0, -60.0)) + parameters.steady_surge(shaft) * time * course
-        readings = [compass(time, 0.9 + math.radians(1.0) * noise.standard_normal())]
+        readings = [compass(time, 0.9 + math.radians(1.0) * noise.standard_normal())._replace(sequence=k)]
         if k % 10 == 0:
             wrong = off * np.array((0.8, -0.6)) if k == 10 else 0.0
             sigma = UsblModel().deviation(float(np.linalg.norm(away)))
