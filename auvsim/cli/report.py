@@ -164,6 +164,7 @@ ROWS = {  # key of a summary: what the table calls it; those that a vehicle's su
     "finished": "finished",
     "failure_text": "because",
     "attempts": "attempts",
+    "approaches": "approaches begun",
     "waypoints": "waypoints reached",
     "time": "time [s]",
     "miss_distance": "miss distance at the entrance [m]",

@@ -79,6 +79,7 @@ class Score:
     trials: int
     first: int  # docked on the first attempt
     within: int  # docked within LATER attempts
+    approaches: float  # begun, mean over all trials
     miss_rms: float  # of those that docked, at the mouth [m]
     cross_rms: float  # its part across the axis [m]
     nees: float  # of the horizontal position per degree of freedom, mean over all estimates
@@ -113,6 +114,7 @@ def score(summaries: Sequence[Summary]) -> Score:
         trials=len(summaries),
         first=sum(s.attempts == 1 for s in docked),
         within=sum(s.attempts <= LATER for s in docked),
+        approaches=sum(s.approaches for s in summaries) / len(summaries),
         miss_rms=_rms([s.miss_distance for s in docked]),
         cross_rms=_rms([s.cross_track for s in docked]),
         nees=mean("nees_per_dof"),
@@ -151,12 +153,26 @@ def table(study: Mapping[str, Sequence[Summary]], seed: int) -> Table:
     """Makes a table with one row for each condition."""
     count = max(map(len, study.values()), default=0)
     result = Table("condition", title=f"{count} docking trials of seed {seed} in each condition")
-    headings = ("first attempt [%]", f"within {LATER} [%]", "miss rms [m]", "across [m]", "NEES", "in the dock's axes")
+    headings = (
+        "first attempt [%]",
+        f"within {LATER} [%]",
+        "approaches",
+        "miss rms [m]",
+        "across [m]",
+        "NEES",
+        "in the dock's axes",
+    )
     for heading in headings:
         result.add_column(heading, justify="right")
     for name, summaries in study.items():
         s = score(summaries)
-        numbers = (f"{s.miss_rms:.3f}", f"{s.cross_rms:.3f}", f"{s.nees:.2f}", f"{s.nees_relative:.2f}")
+        numbers = (
+            f"{s.approaches:.2f}",
+            f"{s.miss_rms:.3f}",
+            f"{s.cross_rms:.3f}",
+            f"{s.nees:.2f}",
+            f"{s.nees_relative:.2f}",
+        )
         result.add_row(name, share(s.first, s.trials), share(s.within, s.trials), *numbers)
     return result
 

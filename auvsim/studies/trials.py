@@ -21,6 +21,7 @@ class Summary:
     failure_reason: str | None
     failure_text: str | None
     attempts: int
+    approaches: int
     time: float  # [s]
     miss_distance: float | None  # [m]
     cross_track: float | None  # its part across the axis [m]

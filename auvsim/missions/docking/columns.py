@@ -19,6 +19,7 @@ COLUMNS: Mapping[str, Metric] = {
     "failure_reason": Metric("str", "", "timeout, aborted or diverged; none if docked"),
     "failure_text": Metric("str", "", "what the log says of it"),
     "attempts": Metric("int", "1", "attempts to dock"),
+    "approaches": Metric("int", "1", "approaches begun, with those broken off early that count as no attempt"),
     "time": Metric("float", "s", "of docking, or of the end"),
     "miss_distance": Metric("float", "m", "of the nose from the dock's axis where it first enters, last attempt"),
     "cross_track": Metric("float", "m", "its part to starboard"),

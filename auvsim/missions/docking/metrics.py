@@ -50,6 +50,7 @@ def docking_metrics(log: VehicleLog) -> dict[str, Any]:
         "failure_reason": reason,
         "failure_text": text,
         "attempts": attempts,
+        "approaches": _approaches(log),
         "time": end,
         "miss_distance": last.miss_distance if last else None,
         "cross_track": last.cross_track if last else None,
@@ -61,6 +62,13 @@ def docking_metrics(log: VehicleLog) -> dict[str, Any]:
         **_at_rest(log, docked_at),
         "crossings": [dataclasses.asdict(crossing) for crossing in passed],
     }
+
+
+def _approaches(log: VehicleLog) -> int:
+    """How often the vehicle set out from its gate towards the mouth."""
+    phase, approach = log["mission"]["phase"], log.phases.index("approach")
+    on = np.concatenate(([False], phase == approach))
+    return int(np.sum(on[1:] & ~on[:-1]))
 
 
 def _at_rest(log: VehicleLog, docked_at: float | None) -> dict[str, Any]:
