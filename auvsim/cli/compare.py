@@ -49,8 +49,16 @@ def show(found) -> None:
         errors.add_row(*row)
     console.print(errors)
     terms = Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    for heading in ("coefficient", "change", "95 % interval", "share explained"):
+    terms.add_column("coefficient")
+    for heading in ("change", "95 % interval", "share explained"):
         terms.add_column(heading, justify="right")
     for e in found.explanations[:5]:
-        terms.add_row(e.name, f"{e.change:+.1%}", f"{e.low:+.1%} to {e.high:+.1%}", f"{e.share:.1%}")
+        terms.add_row(
+            f"{e.name} {gap.MEANS[e.name]}", f"{e.change:+.1%}", f"{e.low:+.1%} to {e.high:+.1%}", f"{e.share:.1%}"
+        )
     console.print(terms)
+    limits = [f"{name} {change:.0%}" for name, change in found.hidden]
+    text = f"changes that this log would just show: {', '.join(limits) or 'none'}"
+    if found.unseen:
+        text += f"; none of {', '.join(found.unseen)} by up to 100 %"
+    console.print(text, style="dim", soft_wrap=True)

@@ -24,11 +24,19 @@ GRADES = (("A", 0.03), ("B", 0.06), ("C", 0.12), ("D", 0.25))
 GRADED = 60.0  # horizon of the grade [s]; the longest there is where a record is shorter
 VELOCITIES = ("surge", "sway", "yaw rate")
 CANDIDATES = (*DEFAULT_FREE, "X_ud", "Y_vd", "N_rd")
+MEANS = {
+    "X_uu": "axial drag", "X_dd": "the rudder's drag", "X_nn": "thrust", "X_nu": "thrust lost to speed",
+    "Y_uv": "side force in drift", "Y_ur": "side force in turns", "Y_vv": "cross-flow drag in drift",
+    "Y_rr": "cross-flow drag in turns", "Y_dd": "the rudder's side force", "N_uv": "moment in drift",
+    "N_ur": "damping of turns", "N_vv": "cross-flow moment in drift", "N_rr": "cross-flow moment in turns",
+    "N_dd": "the rudder's moment", "X_ud": "added mass ahead", "Y_vd": "added mass aside", "N_rd": "added inertia",
+}  # fmt: skip
 FLOOR = np.array([0.02, 0.03, math.radians(0.2)])  # residuals that no coefficient is sought for [m/s, m/s, rad/s]
 # Of the floor, what smoothing, servos and the planar model's own lack may leave that looks like a change of a
 # coefficient: half of it over an equal REMUS-100.
 SYSTEMATIC = 0.5
 PLAUSIBLE = 1.0  # a coefficient that vanishes or doubles; larger changes stand for something else
+HIDDEN = 4  # changes that are named of those that a log would not show
 ITERATIONS = 3  # of the change that explains most: the motion is not linear in it
 LEAST_SHARE = 0.2  # explained, for a coefficient to be named
 NEAR = 0.1  # share explained by which two coefficients are not told apart
@@ -77,6 +85,7 @@ class Gap:
     starts: int
     explanations: tuple[Explanation, ...]  # by the plausible candidates, the best first
     size: Array  # (3,) rms of the residuals in surge, sway [m/s] and yaw rate [rad/s], see `cleared`
+    visible: dict[str, float]  # relative change of each coefficient that alone would reach the floor in this log
     grade: str
     graded: float  # horizon of the grade [s]
     notes: tuple[str, ...]
@@ -90,14 +99,29 @@ class Gap:
         return tuple(e for e in clear if e.share > clear[0].share - NEAR)
 
     @property
+    def hidden(self) -> list[tuple[str, float]]:
+        """Coefficients with the change up to which this log shows nothing of it; from the largest plausible one."""
+        return sorted(((n, c) for n, c in self.visible.items() if c <= PLAUSIBLE), key=lambda pair: -pair[1])
+
+    @property
+    def unseen(self) -> list[str]:
+        """Coefficients of which this log shows not even that they double or vanish."""
+        return [name for name, change in self.visible.items() if change > PLAUSIBLE]
+
+    @property
     def verdict(self) -> str:
         """The sheet in one line."""
         error = f"off by {self.errors[self.graded]:.1%} of the distance run after {self.graded:.0f} s"
         said = f"grade {self.grade}: {self.vehicle} is {error}"
+        if not self.explained and (self.size < FLOOR).all():
+            hidden = ", ".join(f"{change:.0%} of {name}" for name, change in self.hidden[:HIDDEN])
+            more = f", and any of {', '.join(self.unseen)}" if self.unseen else ""
+            return f"{said}; too little is left to name a coefficient: this log hides changes of {hidden}{more}"
         if not self.explained:
             return f"{said}; no one coefficient explains the rest"
         best, *near = self.explained
-        text = f"{best.name} {best.change:+.0%} ({best.low:+.0%} to {best.high:+.0%}) explains {best.share:.0%} of it"
+        text = f"{best.name} ({MEANS[best.name]}) {best.change:+.0%} ({best.low:+.0%} to {best.high:+.0%}) explains "
+        text += f"{best.share:.0%} of it"
         return f"{said}; {text}" + (f", as would {' or '.join(e.name for e in near)}" if near else "")
 
 
@@ -142,6 +166,7 @@ def compare(
         vehicle=vehicle, records=tuple(found), planar=tuple(planar), errors=errors,
         planar_errors=by_horizon(planar)[0] if planar else {}, starts=starts,
         explanations=explain(found, condensed), size=np.sqrt(np.mean(residuals**2, axis=0)),
+        visible=visible(found, condensed),
         grade=next((grade for grade, most in GRADES if errors[graded] <= most), "E"), graded=graded,
         notes=tuple(notes),
     )  # fmt: skip
@@ -209,6 +234,20 @@ def explain(besides: Sequence[Beside], condensed: PlanarParameters) -> tuple[Exp
     return tuple(sorted((e for e in found if e is not None), key=lambda e: -e.share))
 
 
+def visible(besides: Sequence[Beside], condensed: PlanarParameters) -> dict[str, float]:
+    """The relative change of each coefficient whose effect on this log's motion is as large as the floor.
+
+    Nothing is named of smaller ones. Their effect is taken as linear in the change.
+    """
+    found = {}
+    for name in CANDIDATES:
+        if getattr(condensed, name) != 0.0:
+            slopes = np.concatenate([_slope(b, condensed, name, 0.0) for b in besides])
+            largest = float(np.sqrt(np.mean(slopes**2, axis=0)).max())
+            found[name] = 1.0 / largest if largest > 0.0 else math.inf
+    return found
+
+
 def _explained(
     name: str, besides: Sequence[Beside], residuals: Sequence[Array], condensed: PlanarParameters
 ) -> Explanation | None:
@@ -216,10 +255,7 @@ def _explained(
     change = 0.0
     for _ in range(ITERATIONS):
         made = [_made(b, condensed, name, change) / FLOOR for b in besides]
-        slopes = [
-            (_made(b, condensed, name, change + 0.05) - _made(b, condensed, name, change - 0.05)) / (0.1 * FLOOR)
-            for b in besides
-        ]  # fmt: skip
+        slopes = [_slope(b, condensed, name, change) for b in besides]
         rest = [residual - own for residual, own in zip(residuals, made, strict=True)]
         if not all(np.isfinite(values).all() for values in (*slopes, *rest)):
             return None
@@ -245,6 +281,12 @@ def _made(beside: Beside, condensed: PlanarParameters, name: str, change: float)
     value = float(getattr(condensed, name))
     ends = [in_planar(replace(condensed, **{name: value * f}), beside.record, surge) for f in (1.0 + change, 1.0)]
     return cleared(beside, (ends[0] - ends[1])[beside.first :])
+
+
+def _slope(beside: Beside, condensed: PlanarParameters, name: str, change: float) -> Array:
+    """Derivative (n, 3) of that by the relative change, in floors."""
+    up, down = (_made(beside, condensed, name, change + d) for d in (0.05, -0.05))
+    return (up - down) / (0.1 * FLOOR)
 
 
 def _deviation(besides: Sequence[Beside], left: Sequence[Array], slopes: Sequence[Array]) -> float:

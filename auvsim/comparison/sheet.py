@@ -12,7 +12,7 @@ from auvsim.analysis.style import dress, save
 from auvsim.base.errors import InputError
 from auvsim.base.files import whole
 from auvsim.base.templates import environment
-from auvsim.comparison.gap import GRADES, VELOCITIES, Gap, reckoned, spectra
+from auvsim.comparison.gap import GRADES, MEANS, VELOCITIES, Gap, reckoned, spectra
 from auvsim.identification.report import svg
 
 MEASURED, SIMULATED, OTHER = "#444444", "#1f5fa8", "#d95f02"
@@ -39,7 +39,7 @@ def write(gap: Gap, folder: Path) -> list[Path]:
     text = environment("auvsim.comparison").get_template("gap.html.j2")
     try:
         with whole(page) as partial:
-            made = text.render(gap=gap, limits=limits(), rows=rows(gap), picture=Markup(svg(figure)))
+            made = text.render(gap=gap, limits=limits(), means=MEANS, rows=rows(gap), picture=Markup(svg(figure)))
             partial.write_text(made, encoding="utf-8")
     except OSError as error:
         raise InputError(f"{folder}: cannot be written: {error.strerror or error}") from None
@@ -123,7 +123,7 @@ def _coefficients(axes: Axes, gap: Gap) -> None:
         axes.barh(row, 100.0 * e.share, color=OTHER if e.name in named else "#aaaaaa")
         text = f"{e.change:+.0%} [{e.low:+.0%}, {e.high:+.0%}]"
         axes.text(100.0 * e.share + 1.0, row, text, fontsize=8.5, va="center")
-    axes.set_yticks(range(len(shown)), [e.name for e in shown])
+    axes.set_yticks(range(len(shown)), [f"{MEANS[e.name]}, {e.name}" for e in shown])
     axes.invert_yaxis()
     axes.set_xlim(0.0, 130.0)
     axes.set_xticks(np.arange(0, 101, 20))

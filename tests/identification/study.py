@@ -65,6 +65,10 @@ class Case(NamedTuple):
     baselines: dict[str, float]
     inside: np.ndarray  # (m,) share of held-out positions inside their 95 % band, by horizon
     count: np.ndarray  # (m,)
+    # Errors of one held-out record by the least of all others there (2,): of the choice, and of the one of those others
+    # that is the best in the other record, which no choice can know.
+    by_record: np.ndarray
+    foretold: np.ndarray
     halves: float  # rms of the scores of fits to disjoint halves
     seconds: float  # of CPU
 
@@ -95,22 +99,28 @@ def run(name: str, seed: int, *, quick: bool, output_error: bool) -> Case:
         if output_error:
             fits["planar, output error"] = baselines.output_error(sailed[:4])
             fits["Abkowitz, output error"] = baselines.output_error(sailed[:4], baselines.abkowitz)
-        others = {key: _error(motions, own) for key, own in fits.items()}
-    chosen, alone, k = found.choice.chosen, found.choice.alone, found.place
-    single = found.choice.folds.fit(alone.structure, alone.step, -1)
+        others = {key: _vector(own) for key, own in fits.items()}
+    chosen, alone, k, folds = found.choice.chosen, found.choice.alone, found.place, found.choice.folds
+    single = folds.fit(alone.structure, alone.step, -1)
+    all_others = [*others.values(), *(folds.fit(alone.structure, step, -1).vector for step, _ in found.steps)]
+    each = np.array([[_off([motion], own) for motion in motions] for own in all_others])
+    best = each.argmin(axis=0)
+    foretold = np.array([each[best[1], 0], each[best[0], 1]]) / each.min(axis=0)
     return Case(
         f"{chosen.structure.name}, {chosen.step}", float(found.judged.share[k]),
-        min(float(errors[k]) for _, errors in found.steps), _off(motions, single.vector), others,
-        found.judged.inside, found.judged.count, found.halves.rms, seconds,
+        min(float(errors[k]) for _, errors in found.steps), _off(motions, single.vector),
+        {key: _off(motions, own) for key, own in others.items()}, found.judged.inside, found.judged.count,
+        np.array([_off([motion], found.fit.vector) for motion in motions]) / each.min(axis=0), foretold,
+        found.halves.rms, seconds,
     )  # fmt: skip
 
 
-def _error(motions: list[data.Motion], coefficients: list[np.ndarray]) -> float:
-    """Of a baseline's coefficients, on the terms that they are of."""
+def _vector(coefficients: list[np.ndarray]) -> np.ndarray:
+    """All parameters of a baseline's coefficients."""
     values = {}
     for axis, names, own in zip(("surge", "sway", "yaw"), (SURGE, LATERAL, LATERAL), coefficients, strict=True):
         values |= {f"{axis} {term}": float(value) for term, value in zip(names, own, strict=False)}
-    return _off(motions, vector(values))
+    return vector(values)
 
 
 def _off(motions: list[data.Motion], parameters: np.ndarray) -> float:
@@ -158,10 +168,13 @@ def show(name: str, cases: list[Case]) -> None:
         "the best of its steps": [c.error / c.best_step for c in cases],
         "the best structure alone": [c.error / c.alone for c in cases],
         "the best of all these": [c.ratio for c in cases],
+        "the same, each record held out": [float(x) for c in cases for x in c.by_record],
+        "what the other record would have chosen of these, there": [float(x) for c in cases for x in c.foretold],
     }
     for key, values in ratios.items():
         within = np.mean([value <= 1.03 for value in values])
-        print(f"  {key}: {mean(values):.2f} ({min(values):.2f} to {max(values):.2f}), within 3 % in {within:.0%}")
+        print(f"  {key}: {mean(values):.2f}, median {np.median(values):.2f} ({min(values):.2f} to {max(values):.2f}), "
+              f"within 3 % in {within:.0%}")  # fmt: skip
     inside = np.average([c.inside for c in cases], weights=[c.count for c in cases])
     print(f"  bands of 95 % hold {inside:.1%} of {sum(int(c.count.sum()) for c in cases)} held-out positions")
     print(f"  disjoint halves: rms of scores {np.median([c.halves for c in cases]):.2f}, at most "

@@ -21,7 +21,7 @@ from auvsim.identification.motion.choice import Candidate, Folds, choose, seen, 
 from auvsim.identification.motion.dimensions import Dimensions, coefficients
 from auvsim.identification.motion.identify import MotionIdentification, _planar, identify_motion, verdicts
 from auvsim.identification.motion.rollout import persistence, roll
-from auvsim.identification.motion.uncertainty import halves, of_left_out
+from auvsim.identification.motion.uncertainty import between, halves, of_left_out
 from auvsim.identification.pipeline import Identification
 from auvsim.identification.readers import read
 from auvsim.identification.records import Record
@@ -190,11 +190,11 @@ def test_least_squares_find_a_structure_s_own_coefficients() -> None:
             assert got[label] == pytest.approx(true[label], rel=tolerance, abs=2e-4), label
 
 
-def _simulated(coefficients: dict[str, float], duration: float) -> data.Motion:
+def _simulated(coefficients: dict[str, float], duration: float, seed: int = 3) -> data.Motion:
     """A motion of known coefficients, measured all but exactly."""
     step = 0.2
     times = step * np.arange(round(duration / step))
-    generator = np.random.default_rng(3)
+    generator = np.random.default_rng(seed)
     rudder = np.repeat(generator.uniform(-0.4, 0.4, 60), 25)[: len(times)]
     shaft = np.repeat(generator.uniform(40.0, 70.0, 15), 100)[: len(times)]
     process = TermsProcess(coefficients, np.zeros(8), max_substep=0.02)
@@ -531,12 +531,37 @@ def test_halves_go_as_far_as_both_converge() -> None:
     motion = _simulated(true, 240.0)
     found = fit.least_squares([motion], kept)
     again = fit.segments([motion], [found], fit.STEPS[1])
-    by_step = halves([motion], kept, [again])
+    folds = Folds([motion])
+    by_step = halves(folds, kept, [again])
     assert by_step.step == fit.STEPS[1]
     assert by_step.scores.shape == (6,)
-    assert halves([motion], kept).step == fit.STEPS[0]
+    assert halves(folds, kept).step == fit.STEPS[0]
     astray = replace(again, step=fit.STEPS[2], values=again.values * np.nan)
-    assert halves([motion], kept, [again, astray]).step == fit.STEPS[1]
+    assert halves(folds, kept, [again, astray]).step == fit.STEPS[1]
+
+
+@pytest.mark.parametrize("apart", [0.0, 0.3])
+def test_records_that_differ_widen_intervals(apart: float) -> None:
+    """Coefficients that change from record to record by 30 % show in the factor; without a change it is near 1.
+
+    It is up to 5 where all five stretches of a record move alike. Else the mean over six coefficients of chi squares of
+    three degrees of freedom by three has a standard deviation of 0.33: at most 2.
+    """
+    kept = structure("true", "u|u| n|n|", "v ur", "r uud")
+    values = {"surge u|u|": -0.012, "surge n|n|": 3e-6, "sway v": -0.05, "sway ur": -0.3, "yaw r": -0.08}
+    motions, generator = [], np.random.default_rng(5)
+    for k, sign in enumerate((1.0, -1.0, -0.6, 0.8)):
+        own = {name: value * (1.0 + apart * sign * (-1) ** j) for j, (name, value) in enumerate(values.items())}
+        motion = _simulated(own | {"yaw uud": 0.012}, 300.0, 10 + k)
+        noise = np.zeros_like(motion.states)
+        noise[:, 3:6] = generator.normal(0.0, [0.003, 0.003, 0.0008], (len(noise), 3))
+        motions.append(replace(motion, states=motion.states + noise))
+    folds = Folds(motions)
+    factor = between(folds, kept, fit.STEPS[0])
+    found = halves(folds, kept)
+    assert found.between == factor
+    assert found.rms < 2.0
+    assert (2.5 < factor < 6.0) if apart else (1.0 <= factor < 2.0)
 
 
 def test_drag_is_judged_as_a_whole() -> None:

@@ -13,7 +13,17 @@ from auvsim.identification.motion.dimensions import Dimensions, coefficients
 from auvsim.identification.motion.fit import AVERAGE, STEPS, MotionFit
 from auvsim.identification.motion.lags import Lags
 from auvsim.identification.motion.rollout import HORIZONS, horizons, persistence, rms, roll
-from auvsim.identification.motion.uncertainty import Halves, Held, Spread, halves, held, held_of, of_left_out, spread
+from auvsim.identification.motion.uncertainty import (
+    Halves,
+    Held,
+    Spread,
+    between,
+    halves,
+    held,
+    held_of,
+    of_left_out,
+    spread,
+)
 from auvsim.identification.records import Readings, Record
 from auvsim.physics.planar_sets import dissipates
 from estimators.core.types import Array
@@ -128,8 +138,8 @@ def identify_motion(
     chosen, alone, folds = choice.chosen, choice.alone, choice.folds
     say("disjoint halves", 0.8)
     before_it = [folds.fit(alone.structure, step, -1) for step in STEPS[1 : STEPS.index(alone.step) + 1]]
-    apart = halves(motions, alone.structure, before_it)
-    widened = max(1.0, apart.rms**2)
+    apart = halves(folds, alone.structure, before_it)
+    widened = between(folds, alone.structure, alone.step) * max(1.0, apart.rms**2)
     own = widened * fit.covariance(choice.fit)
     say("bands", 0.85)
     reached = horizons([m for _, out in folds.splits for m in out], HORIZONS)
@@ -221,6 +231,8 @@ def verdicts(found: MotionIdentification) -> list[tuple[bool, str]]:
         text += f" ({alone.structure.name} by {found.halves.step})"
     if found.halves.step != alone.step:
         text += f" (by {found.halves.step}, for by {alone.step} they do not converge)"
+    if found.halves.between > 1.0:
+        text += f"; these are {math.sqrt(found.halves.between):.2g} times those within records, as records differ"
     said.append((good, text if good else f"{text}: intervals and bands are widened by it"))
     weak = [
         term for term, value, deviation in zip(chosen.structure.terms, found.fit.values, found.deviations, strict=True)

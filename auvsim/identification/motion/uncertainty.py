@@ -61,6 +61,7 @@ class Halves:
     scores: Array  # (k,) difference of the coefficients by its standard deviation
     rms: float
     step: str  # to which both converge
+    between: float = 1.0  # factor on their covariances that is in these, see `between`
 
 
 def of_left_out(
@@ -201,20 +202,37 @@ def held_of(left_out: Sequence[tuple[Rollouts, Array]], found: Spread) -> Held:
     )
 
 
-def halves(motions: Sequence[Motion], structure: Structure, steps: Sequence[MotionFit] = ()) -> Halves:
+def between(folds: Folds, structure: Structure, step: str) -> float:
+    """Factor on a fit's covariance by what coefficients differ from record to record, beyond what stretches show.
+
+    A structure that is not the vehicle's own fits each manoeuvre with other coefficients, and all stretches of a record
+    alike. The jackknife of the records, or parts, that cross-validation leaves out bears that; of so few it says the
+    size, not the shape: the mean ratio of its variances to those of the stretches. At least 1.
+    """
+    fitted = [folds.fit(structure, step, fold) for fold in range(folds.compared)]
+    values = np.array([fit.values for fit in fitted if fit.converged])
+    count = len(values)
+    if count < 3:
+        return 1.0
+    spread = (count - 1) / count * np.sum((values - values.mean(axis=0)) ** 2, axis=0)
+    own = np.diag(fits.covariance(folds.fit(structure, step, -1)))
+    return max(1.0, float(np.mean(spread / own)))
+
+
+def halves(folds: Folds, structure: Structure, steps: Sequence[MotionFit] = ()) -> Halves:
     """Fits a structure to every other record, or every other part of few records, and to the rest.
 
     Both go as far as both converge: what has run away says nothing of the intervals.
 
     Args:
-        motions: All of them.
+        folds: All motions, and their fits without each part, which say how much records differ.
         structure: What is fitted.
         steps: Fits of it to all of them, by the steps from the second on; searches begin there.
     """
-    parts = list(motions)
+    parts = list(folds.motions)
     if len(parts) < 4:
         parts = []
-        for motion in motions:
+        for motion in folds.motions:
             count = max(1, min(4, int(motion.duration // _SHORTEST)))
             edges = np.linspace(0, len(motion.record.times), count + 1).astype(int)
             parts += [slices(motion, a, b) for a, b in pairwise(edges.tolist())]
@@ -233,6 +251,7 @@ def halves(motions: Sequence[Motion], structure: Structure, steps: Sequence[Moti
         if all(fit.converged for fit in further):
             found[whole.step], last = further, whole.step
     first, second = found[last]
-    spread = np.diag(fits.covariance(first) + fits.covariance(second))
+    more = between(folds, structure, first.step)
+    spread = more * np.diag(fits.covariance(first) + fits.covariance(second))
     scores = (first.values - second.values) / np.sqrt(np.maximum(spread, 1e-300))
-    return Halves(scores=scores, rms=float(np.sqrt(np.mean(scores**2))), step=first.step)
+    return Halves(scores=scores, rms=float(np.sqrt(np.mean(scores**2))), step=first.step, between=more)
