@@ -19,7 +19,7 @@ PLAN = {
 
 NEW = (  # columns
     "estimator.use", "docked_aligned", "final_along", "final_cross", "final_down", "final_angle_deg",
-    "contacts", "shaft_energy", "way",
+    "approaches", "contacts", "shaft_energy", "way",
     *(f"{name}{phase}" for name in ("relative_rms", "nees_relative")
       for phase in ("", "_search", "_homing", "_approach", "_final", "_go_around", "_aborted")),
 )  # fmt: skip
