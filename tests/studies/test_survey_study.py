@@ -1,11 +1,10 @@
 """Errors of a survey's path: the rotation about the dive point by a closed form, NEES, and what stays."""
 
+import io
 import math
-import os
 
 import numpy as np
 import pytest
-
 from rich.console import Console
 
 from auvsim.studies.survey import CLOSED, FIXED, OPEN, RECKONING, WHOLE, Errors, Options, Trial, judged, table, turned
@@ -48,12 +47,13 @@ def test_the_table_sets_each_error_under_its_name() -> None:
     ]  # fmt: skip
     for second in (False, True):
         shown = table(both, Options(trials=2, second_fix=second))
-        console = Console(width=300, record=True, file=open(os.devnull, "w"))
+        console = Console(width=300, record=True, file=io.StringIO())
         console.print(shown)
         row = next(line for line in console.export_text().splitlines() if "2 of 2" in line)
         cells = [cell.strip() for cell in row.split("\u2502")[2:-1]]
         by_name = list(zip([str(column.header) for column in shown.columns][1:], cells, strict=True))
         assert by_name[0] == ("turned: DR", "15.00")  # the root of (9 + 441) / 2
-        assert ("S / DR", "3.00") in by_name and ("path / DR", "4.00") in by_name
+        assert ("S / DR", "3.00") in by_name
+        assert ("path / DR", "4.00") in by_name
         assert [value for name, value in by_name if name == "S fix"] == (["75.00", "125.00"] if second else [])
         assert ("NEES: DR", "0.10") in by_name
