@@ -1,7 +1,7 @@
 """Dead reckoning by DVL, gyro and compass, corrected by fixes and ranges: for vehicles of which no model is known."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -42,6 +42,8 @@ class ReckoningNavigator(OverHistory):
     that fixes the position it starts at the datum.
     """
 
+    positions: tuple[str, ...] = (FIX,)  # kinds of measurement that are one of the position
+
     def __init__(self, setup: NavigatorSetup) -> None:
         s = setup.settings
         motion = self._motion()
@@ -63,7 +65,7 @@ class ReckoningNavigator(OverHistory):
                 "surge": s.acceleration,
                 "sway": s.acceleration,
                 "yaw_rate": s.yaw_acceleration,
-                "gyro_bias": self._gyro_walk(setup),
+                **self._walks(setup),
             },
         )
         models = {
@@ -83,9 +85,9 @@ class ReckoningNavigator(OverHistory):
             motion = with_error(motion, name, unit)
         return motion
 
-    def _gyro_walk(self, setup: NavigatorSetup) -> float:
-        """Process noise of the gyro's bias [rad2/s3]."""
-        return GYRO_WALK
+    def _walks(self, setup: NavigatorSetup) -> dict[str, float]:
+        """Process noise of the sensors' errors, by state [unit2/s]."""
+        return {"gyro_bias": GYRO_WALK}
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         """The filter behind its delay buffer."""
@@ -101,6 +103,10 @@ class ReckoningNavigator(OverHistory):
     def _more(self) -> list[Measurement]:
         """What else there is to tell since the last update."""
         return []
+
+    def _measured(self, reading: Reading) -> Iterable[Measurement]:
+        """What a reading says of the horizontal motion."""
+        return measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
 
     def reset(self) -> None:
         """Forgets everything."""
@@ -119,7 +125,7 @@ class ReckoningNavigator(OverHistory):
             elif reading.sensor == "usbl":
                 found.append(self._fix(reading))
             elif reading.sensor in self._sensors:
-                found += measurements(reading, self._sensors[reading.sensor], self._depth.value or 0.0, tilt=self._tilt)
+                found += self._measured(reading)
         result = self._estimator.tick(time, (), [*found, *self._more()])
         n = len(self._space)
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
@@ -156,7 +162,7 @@ class ReckoningNavigator(OverHistory):
         """At the first node with a fix and a compass at or before it; at the first compass, where nothing locates."""
         node = nodes[index]
         earlier = [m for other in nodes[: index + 1] for m in other.measurements if m.kind == COMPASS]
-        fix = next((m for m in node.measurements if m.kind == FIX), None)
+        fix = next((m for m in node.measurements if m.kind in self.positions), None)
         if not earlier or (self._located and fix is None):
             return None
         deviation = UNKNOWN if self._ranged else 0.0

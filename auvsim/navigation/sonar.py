@@ -13,7 +13,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.frames import wrap
 from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
-from auvsim.navigation.measurements import averaged, of_kind
+from auvsim.navigation.measurements import FIX, averaged, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.navigation.reckoning import ReckoningNavigator
 from auvsim.navigation.sonar_frames import SectorFrames
@@ -24,15 +24,20 @@ from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.imaging_sonar import ImagingSonarSettings, geometry
 from estimators.core.estimator import Estimator
+from estimators.core.history import Node
+from estimators.core.models import sensors
 from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
-from estimators.core.types import Measurement, Models
+from estimators.core.types import Gaussian, Measurement, Models
+from estimators.docking.aids import WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
 from estimators.map_path.window import Window
 
 SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
+GPS = "gps"  # kind of measurement whose slow error is in the state
+GPS_ERRORS = ("gps_north", "gps_east")  # that slow error
 ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
 SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
@@ -45,11 +50,14 @@ HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows
 class SonarNavigator(ReckoningNavigator):
     """Dead reckoning with the DVL's scale as a state, and frames of a sonar matched with earlier ones.
 
-    A frame is laid on the floor at its mean depth of late, which altimeter and depth gauge tell.
+    A frame is laid on the floor at its mean depth of late, which altimeter and depth gauge tell. GPS errs slowly: that
+    error is a state, so that fixes one after another do not make the position better known than it is.
 
     Raises:
         InputError: The vehicle has no imaging sonar or no altimeter, or more than one sonar.
     """
+
+    positions = (FIX, GPS)
 
     def __init__(self, setup: NavigatorSetup) -> None:
         s = setup.settings
@@ -67,7 +75,11 @@ class SonarNavigator(ReckoningNavigator):
         cell = reach / ROWS
         half = min(math.radians(60.0), 0.98 * float(bearings[-1]))
         grid = SectorGrid(
-            cell=cell, shape=(ROWS, 2 * ROWS), ranges=(max(4.0 * cell, float(ranges[0])), reach), half_sector=half
+            cell=cell,
+            shape=(ROWS, 2 * ROWS),
+            ranges=(max(4.0 * cell, float(ranges[0])), reach),
+            half_sector=half,
+            ahead=settings.nose,
         )
         self._frames = SectorFrames(polar=polar, grid=grid)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
@@ -79,12 +91,16 @@ class SonarNavigator(ReckoningNavigator):
         dvls = of_kind(setup.sensors, DvlSettings)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
+        self._gps: GpsSettings | None = next(iter(of_kind(setup.sensors, GpsSettings).values()), None)
         super().__init__(setup)
 
     def _motion(self) -> Motion:
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
         positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
+        if self._gps is not None:
+            for name in GPS_ERRORS:
+                motion = with_error(motion, name, "m", time_constant=self._gps.wander_time)
 
         def rates(x: Symbols, u: Symbols) -> Symbols:
             c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
@@ -95,6 +111,8 @@ class SonarNavigator(ReckoningNavigator):
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
+        if self._gps is not None:
+            models = {**models, GPS: sensors.fix(motion, bias=GPS_ERRORS)}
         keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
         filter_ = KeyframeFilter(
             self._matcher,
@@ -108,14 +126,27 @@ class SonarNavigator(ReckoningNavigator):
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
 
-    def _gyro_walk(self, setup: NavigatorSetup) -> float:
+    def _walks(self, setup: NavigatorSetup) -> dict[str, float]:
+        walks = super()._walks(setup)
         gyros = of_kind(setup.sensors, GyroSettings)
-        return max((math.radians(g.bias_walk_deg) ** 2 for g in gyros.values()), default=0.0) or super()._gyro_walk(
-            setup
-        )
+        walk = max((math.radians(g.bias_walk_deg) ** 2 for g in gyros.values()), default=0.0) or walks["gyro_bias"]
+        wander = 0.0 if self._gps is None else 2.0 * self._gps.wander**2 / self._gps.wander_time
+        return {**walks, "gyro_bias": walk, **({} if self._gps is None else dict.fromkeys(GPS_ERRORS, wander))}
 
     def _known(self) -> dict[str, float]:
-        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6)}
+        wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
+        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), **wander}
+
+    def _start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+        """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""
+        found = super()._start(nodes, index)
+        if found is not None and any(m.kind == GPS for m in found[1]):
+            covariance = found[0].covariance
+            for axis, name in enumerate(GPS_ERRORS):
+                k = self._space.index(name)
+                covariance[axis, axis] += covariance[k, k]
+                covariance[axis, k] = covariance[k, axis] = -covariance[k, k]
+        return found
 
     def reset(self) -> None:
         """Forgets everything."""
@@ -123,6 +154,7 @@ class SonarNavigator(ReckoningNavigator):
         self._altitude = self._floor = math.nan
         self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
         self._fixed: float | None = None  # when there was a fix last [s]
+        self._counts: dict[int, int] = {}  # readings in each mean since the last update, by its id
         self._seen = 0  # frames near the floor
         self._dived = False  # whether the begin of the dive was marked
 
@@ -136,15 +168,26 @@ class SonarNavigator(ReckoningNavigator):
             elif reading.sensor in self._altimeters:
                 self._hear(reading)
         fixes = [reading for reading in plain if reading.sensor == "usbl"]
-        means = [
-            reading._replace(stamp=round(reading.stamp, 6))
-            for reading, _ in averaged([r for r in plain if r not in fixes])
-        ]
+        means = []
+        self._counts.clear()
+        for reading, count in averaged([r for r in plain if r not in fixes]):
+            means.append(reading._replace(stamp=round(reading.stamp, 6)))
+            self._counts[id(means[-1])] = count
         if any(reading.sensor in self._positions for reading in plain):
             self._fixed = time
         self._marks = self._dive_mark(time)
         self._images = [image for image in images if self._is_used()]
         return super().update(time, [*means, *fixes], messages, commands)
+
+    def _measured(self, reading: Reading) -> list[Measurement]:
+        """What the mean of some readings says: its noise is less by the root of their number, see `averaged`."""
+        count = self._counts.get(id(reading), 1)
+        own = self._sensors[reading.sensor]
+        if isinstance(own, GpsSettings):
+            found = [replace(m, kind=GPS, covariance=own.noise**2 * np.eye(2)) for m in super()._measured(reading)]
+        else:
+            found = super()._measured(reading)
+        return [replace(m, covariance=m.covariance / count) for m in found if m.kind != WATER]
 
     def _is_used(self) -> bool:
         """Whether a frame that came is matched: each `stride`-th of those taken near the floor."""
@@ -171,9 +214,10 @@ class SonarNavigator(ReckoningNavigator):
 
     def _more(self) -> list[Measurement]:
         """The frames of the images, and a mark where the dive begins."""
+        altitude = self._altitude + self._frames.grid.ahead * math.sin(self._tilt[0])
         frames = [
             self._frames.frame(
-                reading.image, altitude=self._altitude, stamp=reading.stamp, sequence=reading.sequence
+                reading.image, altitude=altitude, stamp=reading.stamp, sequence=reading.sequence
             ).measurement()
             for reading in self._images
         ]

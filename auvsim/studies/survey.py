@@ -6,6 +6,7 @@ judged from the dive point on, as it is believed at the time (what is learnt lat
 after the rotation about it that brings the path closest to the true one.
 """
 
+import gc
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from rich.table import Table
 from auvsim.base.errors import AuvsimError
 from auvsim.base.frames import Array
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.missions.survey.mission import LANES
+from auvsim.missions.survey.mission import HOME, LANES
 from auvsim.navigation import registry
 from auvsim.navigation.estimate import Estimate
 from auvsim.simulation.loading import load_scenario
@@ -27,6 +28,8 @@ from auvsim.simulation.run import Simulation
 from auvsim.simulation.setups import navigator_setup
 
 RECKONING, OPEN, CLOSED, WHOLE = "dead reckoning", "sonar, no closures", "sonar", "sonar, path at the end"
+FIXED = "sonar, path after a second fix"
+PINNED = {"vehicles": {"remus100": {"mission": {"second_fix": True}}}}
 BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
 
 
@@ -40,6 +43,8 @@ class Options:
     """Seed of every random number."""
     jobs: int | None = None
     """Processes; by default one for each core."""
+    second_fix: bool = False
+    """Surfaces again for a fix after the lanes; the path after it is one more row of errors."""
 
 
 class Errors(NamedTuple):
@@ -94,6 +99,7 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
         trial: number of the mission under that seed.
         pinned: values of the scenario on top of its own.
     """
+    gc.collect()  # the frames of the mission before, half a gigabyte in reference cycles
     scenario = load_scenario("survey", **(pinned or {}))
     simulation = Simulation(scenario, seed, trial, record=False)
     (agent,) = simulation.agents
@@ -109,7 +115,8 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
     (bias,) = (s.heading_bias for s, _, _ in agent.sensors if hasattr(s, "heading_bias"))
     true: list[tuple[float, int, Array]] = []  # time, phase, place
     shown: dict[str, list[Shown]] = {name: [] for name in (CLOSED, *BESIDE)}
-    kept, closures, stamp, pose = None, 0, math.nan, np.full(3, math.nan)
+    kept: dict[str, Any] = {}  # the path, and the pose where the dive began, at the end of the lanes and after a fix
+    closures, stamp = 0, math.nan
     last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
     while simulation.ticks < last and not simulation.over:
         before = agent.estimate
@@ -121,12 +128,14 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
                 navigator: Any = sonar if name == CLOSED else others[name]
                 dive = None if navigator.dive is None else navigator.dive[1][:2].copy()
                 shown[name].append(Shown(e.position[:2].copy(), e.horizontal_covariance.copy(), dive))
-        elif phase > LANES and kept is None:
-            kept, closures, (stamp, pose) = sonar.path, sonar.closed, sonar.dive  # before any fix by the dock
+        elif phase > LANES and WHOLE not in kept:
+            kept[WHOLE], closures, stamp = (sonar.path, sonar.dive[1]), sonar.closed, sonar.dive[0]
+        elif phase == HOME and FIXED not in kept and agent.mission.fixed_again:
+            kept[FIXED] = sonar.path, sonar.dive[1]  # before any fix by the dock
     if sonar.dive is None or not any(phase == LANES for _, phase, _ in true):
         raise AuvsimError(f"survey, seed {seed}, trial {trial}: ended before the lanes, at {simulation.time:g} s")
-    if kept is None:
-        kept, closures, (stamp, pose) = sonar.path, sonar.closed, sonar.dive
+    if WHOLE not in kept:
+        kept[WHOLE], closures, stamp = (sonar.path, sonar.dive[1]), sonar.closed, sonar.dive[0]
     times, places = np.array([t for t, _, _ in true]), np.array([place for _, _, place in true])
     dived, on_lanes = int(np.argmin(np.abs(times - stamp))), np.array([phase == LANES for _, phase, _ in true])
     at = places[dived]
@@ -142,9 +151,10 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
         for name, rows in shown.items()
     }  # fmt: skip
     lanes = times[on_lanes]
-    there = (kept[0] >= lanes[0]) & (kept[0] <= lanes[-1])
-    truth = np.column_stack([np.interp(kept[0][there], times, places[:, k]) for k in range(2)])
-    errors[WHOLE] = judged(kept[1][there, :2], None, truth, pose[:2], at)
+    for name, ((stamps, poses, _), dive) in kept.items():
+        there = (stamps >= lanes[0]) & (stamps <= lanes[-1])
+        truth = np.column_stack([np.interp(stamps[there], times, places[:, k]) for k in range(2)])
+        errors[name] = judged(poses[there, :2], None, truth, dive[:2], at)
     floor = abs(float(bias)) * rms(places[on_lanes] - at)
     return Trial(errors, floor, closures, agent.mission.at_rest)
 
@@ -176,7 +186,8 @@ def rms(off: Array) -> float:
 
 def report(options: Options, progress: Progress | None = None) -> Sequence[RenderableType]:
     """Runs the study and returns its table."""
-    tasks = [Task(key=(k,), work=partial(run_one, options.seed, k)) for k in range(options.trials)]
+    pinned = PINNED if options.second_fix else None
+    tasks = [Task(key=(k,), work=partial(run_one, options.seed, k, pinned)) for k in range(options.trials)]
     done = run_tasks(tasks, options.jobs, progress)
     return [table([done[k,] for k in range(options.trials)], options)]
 
@@ -186,30 +197,34 @@ def table(trials: Sequence[Trial], options: Options) -> Table:
     title = f"survey, seed {options.seed}: rms over the lanes, in m; DR dead reckoning, S sonar, -C without closures"
     shown = Table(
         title=title,
-        caption="turned: from the dive point on, rotated about it; path: of the keyframes when the lanes are done",
+        caption="turned: from the dive point on, rotated about it; path: of the keyframes when the lanes are done"
+        + ("; fix: that path after a second fix" if options.second_fix else ""),
     )
-    headings = ("trial", "turned: DR", "S-C", "S", "S path", "S / DR", "raw: DR", "S-C", "S", "S path", "floor",
-                "NEES: DR", "S-C", "S", "closures", "docked")  # fmt: skip
+    more = ("S fix",) if options.second_fix else ()
+    headings = ("trial", "turned: DR", "S-C", "S", "S path", *more, "S / DR", "path / DR", "raw: DR", "S-C", "S",
+                "S path", *more, "floor", "NEES: DR", "S-C", "S", "closures", "docked")  # fmt: skip
     for heading in headings:
         shown.add_column(heading, justify="right")
     for k, trial in enumerate(trials):
-        shown.add_row(str(k), *_cells([trial]), str(trial.closures), "yes" if trial.docked else "no")
+        shown.add_row(
+            str(k), *_cells([trial], options.second_fix), str(trial.closures), "yes" if trial.docked else "no"
+        )
     shown.add_section()
     docked = f"{sum(t.docked for t in trials)} of {len(trials)}"
-    shown.add_row("all", *_cells(trials), f"{np.mean([t.closures for t in trials]):.0f}", docked)
+    shown.add_row("all", *_cells(trials, options.second_fix), f"{np.mean([t.closures for t in trials]):.0f}", docked)
     return shown
 
 
-def _cells(trials: Sequence[Trial]) -> list[str]:
+def _cells(trials: Sequence[Trial], second_fix: bool) -> list[str]:
     """Rms over missions of errors, and mean NEES."""
 
     def together(name: str, field: str) -> float:
         return _root([getattr(t.errors[name], field) if name in t.errors else math.nan for t in trials])
 
-    names = (RECKONING, OPEN, CLOSED, WHOLE)
+    names = (RECKONING, OPEN, CLOSED, WHOLE, *((FIXED,) if second_fix else ()))
     turned_, raw = ([together(name, field) for name in names] for field in ("turned", "raw"))
     nees = [float(np.mean([t.errors[name].nees for t in trials])) for name in names[:3]]
-    values = (*turned_, turned_[2] / turned_[0], *raw, _root([t.floor for t in trials]), *nees)
+    values = (*turned_, turned_[2] / turned_[0], turned_[3] / turned_[0], *raw, _root([t.floor for t in trials]), *nees)
     return [f"{value:.2f}" for value in values]
 
 

@@ -53,9 +53,10 @@ def render(
         height: even [pixels].
         fps: pictures a second.
         speed: speed-up far from the dock; by default such that the video lasts less than a minute.
-        cameras: up to four of overview, follow, above, dock: the main view and those beside it, throughout; the
-            latter three also of one vehicle or dock by its name, as in `follow:auv_2`. By default overview or dock,
-            with follow and above of a lone vehicle, or follow of the first three, beside them.
+        cameras: up to four of overview, follow, above, dock, and map, sonar of a log with a sonar's frames: the main
+            view and those beside it, throughout; follow, above and dock also of one by its name, as in
+            `follow:auv_2`. By default overview or dock, with follow and above of a lone vehicle, or follow of the first
+            three, beside them; of a log with frames map or dock, with follow and sonar.
         progress: called with the number of pictures done and in all.
 
     Raises:

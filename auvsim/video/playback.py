@@ -70,6 +70,7 @@ class Playback:
                 plan.world,
                 plan.rates.physics,
             )
+        self.settings = plan.vehicles
         self.model, self._vehicles = scene.model, scene.vehicles
         self.fixed_modems = {name: flip(np.array(fixed.place)) for name, fixed in plan.fixed_modems.items()}
         scenery.paint_sea_floor(self.model)

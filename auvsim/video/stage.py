@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import mujoco
 
 from auvsim.base.errors import InputError
-from auvsim.video import marks, overlay, panel
+from auvsim.video import marks, overlay, panel, sonar
 from auvsim.video.cameras import Cameras, project, split
 from auvsim.video.canvas import Box, Canvas, Picture
 from auvsim.video.marks import FarMarks, NearMarks
@@ -37,10 +37,16 @@ class Stage:
         if len(cameras) > MOST:
             raise InputError(f"video: {len(cameras)} cameras: at most {MOST} fit into the picture")
         self._playback, self._views = playback, tuple(cameras)
-        self._boxes = layout(width, height, len(cameras) or 1 + len(beside(playback)))
+        frames = sonar.frames_of(playback)
+        self._sonar = sonar.SonarViews(frames, playback.first, playback.docks) if frames else None
+        self._beside = beside(playback) if frames is None else ("follow", "sonar")
+        self._boxes = layout(width, height, len(cameras) or 1 + len(self._beside))
         self._cameras = Cameras(playback, self._boxes[0].width / self._boxes[0].height)
         for name in cameras:
-            self._cameras.check(name)
+            if name in sonar.VIEWS and frames is None:
+                raise InputError(f"camera '{name}': the log holds no frames of a sonar; set its `log_frames`")
+            if name not in sonar.VIEWS:
+                self._cameras.check(name)
         side = side_width(width)
         self._corner = Box(
             width - side if len(self._boxes) > 1 else 0,
@@ -68,16 +74,22 @@ class Stage:
         """
         moment = self._playback.at(frame.time, frame.focus)
         self._playback.pose_model(moment)
-        views = self._views or ("dock" if frame.near else "overview", *beside(self._playback))
+        far = "map" if self._sonar else "overview"
+        views = self._views or ("dock" if frame.near else far, *self._beside)
         if "overview" in views:
             self._far.update(moment)
         drawn = ""  # vehicle round which the marks of the near views are
         for view, box in zip(views, self._boxes, strict=True):
+            if view in sonar.VIEWS:
+                continue
             if view != "overview" and (vehicle := self._cameras.looked_at(view, moment)) != drawn:
                 self._near.update(moment, vehicle, frame.speed)
                 drawn = vehicle
             self._view(view, box, moment, step)
         picture = self._canvas.read()
+        for view, box in zip(views, self._boxes, strict=True):
+            if view in sonar.VIEWS and self._sonar:
+                self._sonar.draw(view, picture, box, frame.time)
         self._write(picture, views, moment, frame)
         return picture
 
@@ -119,6 +131,8 @@ class Stage:
     def _name(self, view: str, moment: Moment) -> str:
         """What stands in the corner of a view."""
         kind, _ = split(view)
+        if kind in sonar.VIEWS and self._sonar:
+            return self._sonar.name(kind, moment.time)
         if kind == "overview":
             return "overview, squares of 50 m"
         if kind == "dock":

@@ -40,12 +40,13 @@ def feature_map(images: Sequence[Array], poses: Array, grid: SectorGrid, cell: f
     """
     if len(images) != len(poses) or not len(images):
         raise ParameterError(f"{len(images)} frames and {len(poses)} poses: there must be as many, one at least")
-    low = np.floor((poses[:, :2].min(axis=0) - grid.ranges[1]) / cell) * cell
-    high = poses[:, :2].max(axis=0) + grid.ranges[1]
+    reach = grid.ranges[1] + abs(grid.ahead)
+    low = np.floor((poses[:, :2].min(axis=0) - reach) / cell) * cell
+    high = poses[:, :2].max(axis=0) + reach
     shape = tuple(np.ceil((high - low) / cell).astype(int) + 1)
     total, counts = np.zeros(shape), np.zeros(shape, dtype=int)
     for image, pose in zip(images, poses, strict=True):
-        rows, columns = _about(pose, low, cell, shape, grid.ranges[1])
+        rows, columns = _about(pose, low, cell, shape, reach)
         north = low[0] + cell * rows[:, None] - pose[0]
         east = low[1] + cell * columns[None, :] - pose[1]
         c, s = np.cos(pose[2]), np.sin(pose[2])

@@ -32,6 +32,7 @@ class SectorGrid:
     shape: tuple[int, int] = (40, 80)  # rows forward, columns to starboard
     ranges: tuple[float, float] = (1.0, 20.0)  # that are seen [m]
     half_sector: float = math.radians(60.0)  # bearings seen are at most this [rad]
+    ahead: float = 0.0  # of the vehicle's origin, where the sonar is [m]; ranges and bearings are the sonar's
 
     def __post_init__(self) -> None:
         low, high = self.ranges
@@ -40,9 +41,9 @@ class SectorGrid:
 
     @cached_property
     def centres(self) -> Array:
-        """Places (rows, columns, 2) of the cells: forward, starboard [m]."""
+        """Places (rows, columns, 2) of the cells: forward, starboard of the vehicle's origin [m]."""
         rows, columns = self.shape
-        forward = self.cell * (np.arange(rows) + 0.5)
+        forward = self.ahead + self.cell * (np.arange(rows) + 0.5)
         starboard = self.cell * (np.arange(columns) + 0.5 - columns / 2)
         return np.stack(np.meshgrid(forward, starboard, indexing="ij"), axis=2).astype(np.float64)
 
@@ -53,7 +54,7 @@ class SectorGrid:
 
     def holds(self, places: Array, margin: float = 0.0) -> np.ndarray:
         """Which places (..., 2) lie in the sector, at least `margin` [m] from its edges."""
-        forward, starboard = places[..., 0], places[..., 1]
+        forward, starboard = places[..., 0] - self.ahead, places[..., 1]
         distance = np.hypot(forward, starboard)
         bearing = np.abs(np.arctan2(starboard, forward))
         inside = (distance >= self.ranges[0] + margin) & (distance <= self.ranges[1] - margin)
@@ -142,7 +143,7 @@ def _resampling(polar: PolarGrid, sector: SectorGrid) -> "sparse.csr_matrix":
     total = sparse.csr_matrix(shape)
     for forward in offsets:
         for starboard in offsets:
-            places = sector.centres.reshape(-1, 2)[cells] + (forward, starboard)
+            places = sector.centres.reshape(-1, 2)[cells] + (forward - sector.ahead, starboard)
             bearing, distance = np.arctan2(places[:, 1], places[:, 0]), np.hypot(places[:, 0], places[:, 1])
             beam, between = _neighbours(bearings, bearing)
             column, along = _neighbours(ranges, distance)

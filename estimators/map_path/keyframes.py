@@ -257,7 +257,7 @@ class KeyframeFilter(WindowFilter):
     def _candidate(self, state: KeyframeState) -> Closure | None:
         """A match of the latest frame with the keyframes of earlier lanes that look at the same floor."""
         settings, latest, poses = self._keyframes, state.count - 1, state.poses
-        ahead = 0.5 * sum(self.matcher.grid.ranges)
+        ahead = self.matcher.grid.ahead + 0.5 * sum(self.matcher.grid.ranges)
         looked_at = poses[:, :2] + ahead * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
         old = [k for k, number in enumerate(state.numbers) if MARKED < number <= latest - settings.gap]
         if not old:

@@ -118,7 +118,7 @@ def _candidates(
     matcher: Matcher, frames: Sequence[Prepared | None], poses: Array, settings: GraphSettings
 ) -> list[Edge]:
     """Closures whose match is far better than no relation, not yet compared with each other."""
-    found, ahead = [], 0.5 * sum(matcher.grid.ranges)
+    found, ahead = [], matcher.grid.ahead + 0.5 * sum(matcher.grid.ranges)
     looked_at = poses[:, :2] + ahead * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
     for k in range(settings.closure_gap, len(poses), settings.closure_spacing):
         past = slice(0, k - settings.closure_gap + 1)

@@ -1,6 +1,7 @@
 """Frames, poses and the comparison of two frames: geometry, calibration, bias and grid lock."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -163,3 +164,38 @@ def test_a_match_finds_a_known_offset():
     assert (np.abs(found.offset - offset) < (0.03, 0.03, 0.004)).all()  # a twentieth of a cell
     far = match(matcher, later, [earlier], np.array([[60.0, 0.0, 0.0]]), prior, Search())
     assert far == "no_overlap"
+
+
+def test_a_sonar_ahead_of_the_origin_swings_with_each_turn():
+    """Frames from 1.7 m ahead, the vehicle turned by 0.2 rad: its own step is found; taken at the origin it is off.
+
+    The transducer moves by 1.7 (1 - cos 0.2, sin 0.2) more than the origin, 3 and 34 cm.
+    """
+    ahead, step = 1.7, np.array([1.1, -0.3, 0.2])
+    rng, first = np.random.default_rng(11), np.array([2.0, -3.0, 0.8])
+    features = rng.uniform(-45.0, 45.0, (800, 2))
+    places = [poses.compose(pose, np.array([ahead, 0.0, 0.0])) for pose in (first, poses.compose(first, step))]
+    images = [point_frame(features, place, 20.0, rng) for place in places]
+    found = {}
+    for nose in (ahead, 0.0):
+        matcher = Matcher(replace(GRID, ahead=nose), FrameModel(density=0.1).scaled(20.0))
+        earlier, later = (matcher.prepare(image) for image in images)
+        prior = np.diag(np.square((0.4, 0.4, 0.05)))
+        result = match(matcher, later, [earlier], step[None], prior, Search())
+        assert isinstance(result, Match)
+        found[nose] = result.offset
+    np.testing.assert_allclose(found[ahead], 0.0, atol=0.03)  # 20 dB: 1 cm
+    # Of the pose turned by 0.2 rad: the excess seen in the later axes.
+    excess = np.array([ahead * (math.cos(0.2) - 1.0), ahead * math.sin(0.2)])
+    turned = np.array([[math.cos(0.2), math.sin(0.2)], [-math.sin(0.2), math.cos(0.2)]]) @ excess
+    np.testing.assert_allclose(found[0.0][:2], turned, atol=0.04)
+
+
+def test_a_grid_ahead_of_the_origin_sees_the_same_frame():
+    """What a polar sonar shows does not depend on where it is mounted; its sector moves with it."""
+    polar = PolarGrid(bearings=tuple(np.radians(np.linspace(-62, 62, 63))), ranges=tuple(np.arange(0.5, 21.0, 0.5)))
+    image, moved = np.random.default_rng(2).random(polar.shape), replace(GRID, ahead=-2.5)
+    np.testing.assert_allclose(to_sector(image, polar, moved), to_sector(image, polar, GRID), atol=1e-9)
+    np.testing.assert_array_equal(moved.seen, GRID.seen)
+    assert moved.holds(np.array([17.4, 0.3]))
+    assert not moved.holds(np.array([17.6, 0.3]))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from auvsim.navigation.sonar_frames import SectorFrames
+from auvsim.navigation.sonar_frames import NEARER, SectorFrames
 from estimators.map_path.frames import EMPTY, NOT_FINITE, PolarGrid, SectorGrid, fault
 
 GRID = SectorGrid(cell=0.5, shape=(40, 80), ranges=(1.0, 20.0), half_sector=np.radians(60.0))
@@ -25,10 +25,10 @@ def made(intensity: np.ndarray, altitude: float = 4.0) -> np.ndarray:
 
 @pytest.mark.parametrize("altitude", [0.5, 6.0])
 def test_an_echo_is_laid_on_the_floor_below_its_slant_range(altitude: float) -> None:
-    """A bright sample at 0.3 rad to starboard and 9.3 m ahead on the floor."""
+    """A bright sample from the near side of what lies at 0.3 rad to starboard and 9.3 m ahead on the floor."""
     bearing, horizontal = 0.3, 9.3
     beam = int(np.argmin(np.abs(np.array(POLAR.bearings) - bearing)))
-    sample = int(np.argmin(np.abs(np.array(POLAR.ranges) - np.hypot(horizontal, altitude))))
+    sample = int(np.argmin(np.abs(np.array(POLAR.ranges) - (np.hypot(horizontal, altitude) - NEARER))))
     intensity = np.ones(POLAR.shape)
     intensity[beam, sample] = 1000.0
     row, column = np.unravel_index(int(np.argmax(made(intensity, altitude))), GRID.shape)

@@ -84,6 +84,11 @@ class Survey(Mission):
         return self._docking.at_rest
 
     @property
+    def fixed_again(self) -> bool:
+        """Whether there was a second fix at the surface."""
+        return self._s.second_fix and self.phase >= HOME
+
+    @property
     def approach(self) -> int | None:
         """Number of the attempt whose approach is under way."""
         return self._docking.approach
@@ -141,7 +146,7 @@ class Survey(Mission):
     def _at_the_surface(self, now: Situation) -> Setpoints:
         """Straight on at the surface until there have been fixes for a while."""
         assert now.estimate is not None
-        if any(o.kind == "fix" and o.accepted for o in now.estimate.outcomes) or self.phase == FIX:
+        if any(o.kind in ("fix", "gps") and o.accepted for o in now.estimate.outcomes) or self.phase == FIX:
             self._fixed = now.time if self._fixed is None else self._fixed
         if self._fixed is not None and now.time - self._fixed >= self._s.fix_time:
             self._enter(DIVE if self.phase == FIX else HOME, now.time, "position fixed")

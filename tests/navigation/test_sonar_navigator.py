@@ -1,0 +1,124 @@
+"""The navigator of surveys: what a mean of readings weighs, GPS whose slow error is a state, what it leaves out."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from auvsim.acoustics.usbl import UsblSettings
+from auvsim.base.reading import Reading
+from auvsim.navigation import registry
+from auvsim.navigation.measurements import averaged
+from auvsim.navigation.navigator import NavigatorSetup
+from auvsim.navigation.settings import SonarSettings
+from auvsim.sensors.altimeter import AltimeterSettings
+from auvsim.sensors.compass import CompassSettings
+from auvsim.sensors.dvl import DvlSettings
+from auvsim.sensors.gps import GpsSettings
+from auvsim.sensors.gyro import GyroSettings
+from auvsim.sensors.imaging_sonar import ImagingSonarSettings
+from auvsim.vehicles import library
+
+GPS = GpsSettings(noise=0.6, wander=1.7, wander_time=90.0)
+SENSORS: dict[str, Any] = {
+    "compass": CompassSettings(heading_noise_deg=2.0),
+    "gyro": GyroSettings(enabled=True),
+    "dvl": DvlSettings(enabled=True),
+    "gps": GPS,
+    "altimeter": AltimeterSettings(),
+    "sonar": ImagingSonarSettings(beams=32, bins=40, nose=1.3),
+}
+NONE: Any = None
+
+
+@pytest.fixture(scope="module")
+def navigator() -> Any:
+    return registry.build(
+        NavigatorSetup(
+            vehicle="auv", settings=SonarSettings(match=False), parameters=None,
+            actuation=library.vehicle("remus100").actuation, period=0.5, rates={}, usbl=UsblSettings(), sensors=SENSORS,
+            dock=None,
+        )
+    )  # fmt: skip
+
+
+def compass(time: float, heading: float = 0.4) -> Reading:
+    """A compass reading on an even keel."""
+    return Reading("compass", time, time, np.array((heading, 0.0, 0.0)), round(10.0 * time))
+
+
+def gps(time: float, north: float, east: float) -> Reading:
+    """A fix."""
+    return Reading("gps", time, time, np.array((north, east)), round(10.0 * time))
+
+
+def dvl(time: float, ahead: float, water: float = math.nan) -> Reading:
+    """Bottom track ahead, water track as given."""
+    return Reading("dvl", time, time, np.array((ahead, 0.0, 0.0, water, water, water)), round(10.0 * time))
+
+
+def located(navigator: Any, fixes: int) -> Any:
+    """The estimate after so many fixes a second apart, at rest."""
+    navigator.reset()
+    for k in range(1, 2 * fixes + 1):
+        time = 0.5 * k
+        found = [compass(time), dvl(time, 0.0), Reading("gyro", time, time, np.zeros(3), k)]
+        estimate = navigator.update(time, found + ([gps(time, 12.0, -7.0)] if k % 2 == 0 else []), (), NONE)
+    return estimate
+
+
+def test_many_fixes_leave_the_slow_error_of_gps(navigator: Any) -> None:
+    """The first has both errors; 30 leave what the best mean of a Gauss-Markov process and white noise leaves."""
+    first, many = located(navigator, 1), located(navigator, 30)
+    for axis in range(2):
+        assert first.covariance[axis, axis] == pytest.approx(0.6**2 + 1.7**2, rel=1e-3)
+        # Best of all weights: the smallest variance of a mean of 30 samples of the process and white noise.
+        apart = np.abs(np.subtract.outer(np.arange(30.0), np.arange(30.0)))
+        C = 1.7**2 * np.exp(-apart / 90.0) + 0.6**2 * np.eye(30)
+        least = 1.0 / np.linalg.solve(C, np.ones(30)).sum()
+        assert many.covariance[axis, axis] == pytest.approx(least, rel=0.03)  # the vehicle's own velocity is not known
+    k = list(navigator.states).index("gps_north")
+    assert first.covariance[0, k] == pytest.approx(-(1.7**2), rel=1e-3)
+    np.testing.assert_allclose(many.position[:2], (12.0, -7.0), atol=0.01)
+    assert all(o.accepted for o in many.outcomes if o.kind == "gps")
+
+
+def test_a_mean_of_readings_weighs_by_their_number(navigator: Any) -> None:
+    """Five readings of 2 deg in a period: the first heading known to 2 / root 5, beside the compass' constant error."""
+    navigator.reset()
+    navigator.update(0.5, [compass(0.1 * k) for k in range(1, 6)], (), NONE)
+    still = [Reading("gyro", 0.1 * k, 0.1 * k, np.zeros(3), k) for k in range(6, 11)]
+    several = [compass(0.1 * k) for k in range(6, 11)]
+    estimate = navigator.update(1.0, [gps(0.8, 0.0, 0.0), *still, *several], (), NONE)
+    assert estimate.initialised
+    k = list(navigator.states).index("compass_bias")
+    H = np.zeros(len(navigator.states))
+    H[2] = H[k] = 1.0  # what the compass shows
+    assert math.sqrt(H @ estimate.covariance @ H) == pytest.approx(math.radians(2.0) / math.sqrt(5.0), rel=0.2)
+
+
+def test_a_water_track_is_no_refused_measurement(navigator: Any) -> None:
+    """The filter has no current that it could tell of."""
+    located(navigator, 2)
+    estimate = navigator.update(2.5, [compass(2.5), dvl(2.5, 0.0, 0.1)], (), NONE)
+    assert estimate.refused == 0
+    assert sorted((o.kind, o.accepted) for o in estimate.outcomes) == [("compass", True), ("dvl_bottom", True)]
+
+
+def test_a_lost_track_leaves_the_other_averaged() -> None:
+    """Components that are lost in all readings stay lost; where only some lost them, readings stay single."""
+    ((mean, count),) = averaged([dvl(1.0, 1.2), dvl(1.2, 1.6)])
+    assert count == 2
+    np.testing.assert_allclose(mean.value[:3], (1.4, 0.0, 0.0))
+    assert np.isnan(mean.value[3:]).all()
+    assert mean.stamp == pytest.approx(1.1)
+    assert [n for _, n in averaged([dvl(1.0, 1.2, 0.3), dvl(1.2, 1.6)])] == [1, 1]
+    lost = [Reading("dvl", time, time, np.full(6, math.nan)) for time in (1.0, 1.2)]
+    assert [n for _, n in averaged(lost)] == [1, 1]
+
+
+def test_frames_are_of_the_place_of_the_transducer(navigator: Any) -> None:
+    """Their cells lie as far ahead of the vehicle's origin as the sonar."""
+    grid = navigator.grid
+    assert grid.centres[0, 0, 0] == pytest.approx(1.3 + 0.5 * grid.cell)
