@@ -52,9 +52,13 @@ def figure(found: FollowerBound) -> Figure:
         bound_maps.draw(axes, grid, title=title, symbols=symbols, regions=mirror, quantity=quantity, limits=limits)
         for k, way in enumerate(found.ways.values()):
             axes.plot(way.places[:, 1], way.places[:, 0], color=vehicle_colour(k), lw=1.1, alpha=0.8, zorder=5)
+    for m, n in np.argwhere(np.isfinite(found.beyond)).tolist():
+        text = f"{found.beyond[m, n]:.3g} m"
+        left.text(found.east[n], found.north[m], text, fontsize=8.5, ha="center", va="center", zorder=8, clip_on=True,
+                  bbox={"fc": "white", "ec": "none", "alpha": 0.8, "pad": 1.0})  # fmt: skip
     figure.suptitle(
         f"Cramér-Rao bound of {found.follower}, over where {found.moved} starts (blind: rank below 4 or above "
-        f"{found.blind_above:g} m)",
+        f"{found.blind_above:g} m; numbers there: what to expect beyond first order)",
         fontsize=13,
     )
     return figure
@@ -75,6 +79,9 @@ def content(found: FollowerBound) -> Content:
         "position": field(whole, found.position, "m", "least rms error of the position"),
         "current": field(whole, found.current, "m/s", "least rms error of the current"),
         "settled": field(place, found.settled, "m", f"least rms error of the position after {found.after:g} s"),
+        "expected": field(
+            place, found.expected, "m", "rms error of the position to expect; NaN where blind and not computed"
+        ),
         "rank": field(place, found.rank.astype(np.int32), "1", "how many of position and current are told, of 4"),
         "condition": field(place, found.condition, "1", "largest over smallest singular value of what is told"),
         "mirror": field(place, found.mirror, "1", "probability of a second solution"),

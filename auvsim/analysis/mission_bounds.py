@@ -11,8 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from auvsim.analysis.mission_plan import STEP, Odometry, Source, Way, is_fixed, odometry, sources, way
+from auvsim.analysis.mission_posterior import DRAWS, Ranges, expected_error
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
+from auvsim.base.randomness import stream
 from auvsim.simulation import building
 from auvsim.simulation.scenario import Scenario
 from estimators.core.models.odometry import SPACE, Displacement, N
@@ -24,6 +26,7 @@ from estimators.motion_radius.ranges import leader_range
 
 OUTPUTS = 40  # times at which the bound is kept
 COARSE = 13  # stations along each axis at which mirror solutions are looked for
+FEW = 3  # stations along each axis at which posteriors are integrated
 NARROW = 0.1  # deviation of the current of filters that look for mirror solutions [m/s]
 HEARD = 0.5  # share of packets that arrive from which a source counts as heard
 BLOCK = 500  # stations at once, for the memory
@@ -45,6 +48,7 @@ class FollowerBound:
     rank: Array  # (m, n) how many of position and current (4) are told to first order
     condition: Array  # (m, n) of that information
     mirror: Array  # (m, n) probability of a second solution that fits as well
+    beyond: Array  # (m, n) rms error [m] to expect beyond first order, at some blind and mirrored stations; else NaN
     after: float  # from when on `settled` counts [s]
     blind_above: float  # bound that counts as blind [m]
     ways: dict[str, Way]
@@ -53,6 +57,12 @@ class FollowerBound:
     def settled(self) -> Array:
         """Least rms error (m, n) of the position [m], over the times from `after` on."""
         return np.sqrt(np.mean(self.position[..., self.times >= self.after] ** 2, axis=-1))
+
+    @property
+    def expected(self) -> Array:
+        """Rms error (m, n) of the position to expect from the best estimator [m]; NaN where only `beyond` knows."""
+        unsure = (self.rank < 4) | (self.mirror > PROBABLE)
+        return np.where(unsure, self.beyond, self.settled)
 
     @property
     def blind(self) -> NDArray[np.bool_]:
@@ -74,6 +84,7 @@ def mission_bounds(
     side: int = 51,
     after: float | None = None,
     blind: float = 50.0,
+    draws: int = DRAWS,
     progress: Progress | None = None,
 ) -> list[FollowerBound]:
     """The bounds of all followers: vehicles that range to something and have no positions from elsewhere.
@@ -82,11 +93,12 @@ def mission_bounds(
         scenario: Every number definite.
         moved: Vehicle, range sensor (its beacon) or structure that starts at each station; None: what the first
             follower hears first.
-        seed: Of the current, where that is random.
+        seed: Of the current, where that is random, and of missions drawn where first order says nothing.
         span: Width of the square of stations about the follower's start [m]; None: such that the scenario's fits.
         side: Stations along each axis.
         after: From when on the position counts [s]; None: from a third of the duration on.
         blind: Bound of the position that counts as blind [m].
+        draws: Missions drawn at stations where first order says nothing; 0: what to expect there stays unknown.
         progress: Called with what is done and the total of it.
 
     Raises:
@@ -110,7 +122,9 @@ def mission_bounds(
     steady, found = field.steady_uniform, []
     for count, name in enumerate(followers):
         done = _Share(progress, count, len(followers))
-        found.append(_bound(scenario, name, heard[name], moved, ways, steady, span, side, after, blind, done))
+        found.append(
+            _bound(scenario, name, heard[name], moved, ways, steady, span, side, after, blind, done, seed, draws)
+        )
     return found
 
 
@@ -127,7 +141,7 @@ class _Share:
 
 def _bound(
     scenario: Scenario, name: str, heard: Sequence[Source], moved: str, ways: dict[str, Way], steady: bool,
-    span: float | None, side: int, after: float | None, blind: float, done: _Share,
+    span: float | None, side: int, after: float | None, blind: float, done: _Share, seed: int, draws: int,
 ) -> FollowerBound:  # fmt: skip
     own = ways[name]
     about = odometry(scenario, name, own, steady)
@@ -150,12 +164,21 @@ def _bound(
     shape = (side, side)
     coarse = [np.linspace(axis[0], axis[-1], min(COARSE, side)) for axis in (north, east)]
     mirror = _mirrors(coarse, start, own, about, heard, moved, prior, times, order, rows, done)
+    mirror = _nearest(coarse, mirror, (north, east))
+    after = end / 3.0 if after is None else after
+    unsure = (rank.reshape(shape) < 4) | (mirror > PROBABLE)
+    beyond = np.full(shape, np.nan)
+    for m, n in _few(north, east, start, unsure):
+        relative = _relative(np.array([[north[m], east[n]]]), start, own, heard, moved, times, order)
+        ranges = Ranges(times, rows, relative[0], _variances(heard, relative, order)[0][0], _told(heard, order))
+        if draws and all(source.bearing_variance is None for source in heard):
+            beyond[m, n] = expected_error(ranges, prior, about.walks, after, stream(seed, 0, "error to expect"), draws)
     variance = np.diagonal(covariance, axis1=2, axis2=3).reshape(*shape, len(outputs), -1)
     return FollowerBound(
         follower=name, moved=moved, start=start, north=north, east=east, times=times[outputs],
         position=np.sqrt(variance[..., :2].sum(axis=-1)), current=np.sqrt(variance[..., 2:4].sum(axis=-1)),
-        rank=rank.reshape(shape), condition=condition.reshape(shape), mirror=_nearest(coarse, mirror, (north, east)),
-        after=end / 3.0 if after is None else after, blind_above=blind, ways=ways,
+        rank=rank.reshape(shape), condition=condition.reshape(shape), mirror=mirror, beyond=beyond,
+        after=after, blind_above=blind, ways=ways,
     )  # fmt: skip
 
 
@@ -291,6 +314,13 @@ def _truth_and_mirrors(own: Way, prior: Array, relative: Array, times: Array, wa
     weights = np.exp(-0.5 * np.sum(means[:, 2:4] ** 2 / np.maximum(np.diagonal(prior)[2:4], 1e-12), axis=1))
     covariances = np.repeat((prior * np.outer(narrow, narrow))[None], len(currents), axis=0)
     return BankState(means, covariances, weights / weights.sum(), walks)
+
+
+def _few(north: Array, east: Array, start: tuple[float, float], of: NDArray[np.bool_]) -> list[tuple[int, int]]:
+    """Stations of those marked, spread over the map, and the one where the scenario has it start."""
+    few = [((np.arange(FEW) + 0.5) / FEW * len(axis)).astype(int).tolist() for axis in (north, east)]
+    planned = tuple(int(np.abs(axis - at).argmin()) for axis, at in zip((north, east), start, strict=True))
+    return [(m, n) for m, n in sorted({planned, *((m, n) for m in few[0] for n in few[1])}) if of[m, n]]
 
 
 def _nearest(coarse, values: Array, axes: tuple[Array, Array]) -> Array:

@@ -16,7 +16,7 @@ from auvsim.cli.report import StudyProgress
 from auvsim.cli.run import output_folder
 from auvsim.simulation.scenario import Scenario
 
-WIDTH = 110  # of the table [columns]
+WIDTH = 122  # of the table [columns]
 MOST = 301  # stations along an axis
 SPANS = (1.0, 1e5)  # width of the square of stations [m]
 
@@ -60,7 +60,8 @@ def table(found: list[FollowerBound]) -> Table:
     )
     lines.add_column("follower", no_wrap=True)
     for heading in (
-        f"rms after {after} s [m]", "current [m/s]", "rank", "mirror", "best rms", "there (N, E)", "blind", "mirrored",
+        f"rms after {after} s [m]", "to expect", "current [m/s]", "rank", "mirror", "best rms", "there (N, E)", "blind",
+        "mirrored",
     ):  # fmt: skip
         lines.add_column(heading, justify="right", no_wrap=True)
     for bound in found:
@@ -73,7 +74,8 @@ def table(found: list[FollowerBound]) -> Table:
             else ("-", "all are blind")
         )
         lines.add_row(
-            bound.follower, f"{bound.settled[m, n]:.2f}", f"{bound.current[m, n, -1]:.4f}", f"{bound.rank[m, n]} of 4",
+            bound.follower, f"{bound.settled[m, n]:.2f}", f"{bound.expected[m, n]:.2f}",
+            f"{bound.current[m, n, -1]:.4f}", f"{bound.rank[m, n]} of 4",
             f"{bound.mirror[m, n]:.0%}", *best, f"{bound.blind.mean():.0%}", f"{bound.mirrored.mean():.0%}",
         )  # fmt: skip
     return lines

@@ -22,7 +22,7 @@ from estimators.core.fusion import cautious_variance
 from estimators.core.history import History
 from estimators.core.models.odometry import SPACE, OdometryNoise
 from estimators.core.types import Gaussian
-from estimators.motion_radius.bank import BankFilter, BankState
+from estimators.motion_radius.bank import BENT, BankFilter, BankState
 from estimators.motion_radius.geometry import MIN_RANGES
 from estimators.motion_radius.ranges import SHARED, leader_range
 
@@ -59,7 +59,7 @@ class MotionRadiusNavigator:
         walks = SPACE.vector({"current_north": s.current_noise, "current_east": s.current_noise})
         self._filter = BankFilter(
             SPACE.belief({"north": north, "east": east}, deviations), noise, walks=walks, gate=0.9999,
-            memory=s.memory,
+            memory=s.memory, bend=BENT,
         )  # fmt: skip
         self._range_sd = math.hypot(s.range_noise, speed * modem.modem.timing_noise)
         self.reset()

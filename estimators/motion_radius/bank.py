@@ -24,8 +24,12 @@ from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdic
 from estimators.motion_radius.geometry import Geometry
 from estimators.motion_radius.ranges import KIND, SHARED
 
+CLOSEST = 1.0  # distance below which a range is not taken to bend any more [m]
 SAME = 0.05  # squared normalised distance below which two filters have come to the same solution
 IMPROBABLE = 1e-6  # probability below which a filter is given up
+BENT = 0.5  # bend of a range over a filter's spread, in the range's deviations, from which on a split is worth it
+MOST, SPLIT = 300, 1e-3  # filters of a bank, and probability from which one is worth a split
+PARTS = (0.2252, 0.6716)  # of a normal density in three: weight of the outer ones, deviation of each (DeMars 2013)
 BREADTH = 1.135  # variance of the normal density that weighs 7 currents a side so that their mixture has the start's
 REACH, WIDTH = 1.8, 0.36  # outermost currents of the bank and deviation of each, in deviations of the start's current
 
@@ -74,6 +78,8 @@ class BankFilter:
         walks: Densities (9,) of random walks of the states [unit^2/s]; None: all are constant.
         gate: Probability with which a range that fits is accepted by the filter that it fits best; None accepts all.
         memory: Time constant of the errors of leaders' places [s]; 0: they are white noise.
+        bend: How far a range may bend over a filter's spread, in the range's deviations, before that becomes three, as
+            `BENT` says; infinite: however far.
 
     Raises:
         ParameterError: The start has other states, the bank has no filter, or the memory is below 0.
@@ -89,6 +95,7 @@ class BankFilter:
         walks: Array | None = None,
         gate: float | None = None,
         memory: float = 0.0,
+        bend: float = math.inf,
     ) -> None:
         if start.mean.shape != (N,) or side < 1:
             raise ParameterError(
@@ -98,7 +105,7 @@ class BankFilter:
         if not memory >= 0.0:
             raise ParameterError(f"memory {memory} s of errors of leaders' places must be 0 s or more")
         self._means, self._covariances, self._weights = spread_over_currents(start, side)
-        self._noise, self._pruned, self._memory = noise, pruned, memory
+        self._noise, self._pruned, self._memory, self._bend = noise, pruned, memory, bend
         self._q = np.zeros(N) if walks is None else np.array(walks, dtype=float)
         self._limit = math.inf if gate is None else chi_square(gate, 1)
 
@@ -132,15 +139,16 @@ class BankFilter:
         if self._memory > 0.0 and m.kind == KIND and told > 0.0:
             state, error = remembered(state, m.source, m.stamp, told, self._memory)
             white -= told * max(0.0, 1.0 - ((depth - own) / distance) ** 2)
-        predicted = predict_modes(state.means, state.covariances, state.since, state.q)
-        means, covariances, logs, nis = correct_modes(*predicted, distance, white, north, east, depth - own, error)
-        best = float(nis[state.weights > 1e-6].min())
+        x, P = predict_modes(state.means, state.covariances, state.since, state.q)
+        x, P, weights = split(x, P, state.weights, north, east, self._bend * math.sqrt(variance))
+        means, covariances, logs, nis = correct_modes(x, P, distance, white, north, east, depth - own, error)
+        best = float(nis[weights > 1e-6].min())
         if best > self._limit:
             return state._replace(verdicts=(*state.verdicts, (m, OUTLIER, best)))
         if not (np.isfinite(logs).all() and np.isfinite(means).all()):
             raise NotFiniteError(f"correction by the range {distance} m at {m.stamp} s is not finite")
         # Errors that last from packet to packet would be counted again and again as evidence for one filter.
-        weights = state.weights if m.kind == SHARED else imm.update(state.weights, logs)
+        weights = weights if m.kind == SHARED else imm.update(weights, logs)
         accepted = state.accepted + 1
         verdict = (m, "", float(nis[weights.argmax()]))
         if accepted % self._pruned == 0 and len(weights) > 1:
@@ -197,6 +205,44 @@ def spread_over_currents(start: Gaussian, side: int) -> tuple[Array, Array, Arra
     covariances = np.repeat((start.covariance * np.outer(shrink, shrink))[None], len(grid), axis=0)
     weights = np.exp(-0.5 * np.sum(grid**2, axis=1) / BREADTH)
     return means, covariances, weights / weights.sum()
+
+
+def split(
+    means: Array, covariances: Array, weights: Array, north: float, east: float, most: float
+) -> tuple[Array, Array, Array]:
+    """The filters, those in three for which a range to a place is no straight line over their spread.
+
+    Over an error e across it a range r is longer by e^2 / (2 r). The three together have the mean and the covariance
+    of the one, and lie along what an error across the range brings with it.
+
+    Args:
+        means: (m, n).
+        covariances: (m, n, n).
+        weights: (m,) probabilities.
+        north: Of the place [m].
+        east: Of the place [m].
+        most: Bend [m], of a standard deviation, that is not worth a split.
+    """
+    share, deviation = PARTS
+    distance = math.sqrt((1.0 - deviation**2) / (2.0 * share))
+    while most < math.inf:
+        way = means[:, :2] - (north, east)
+        r = np.maximum(np.hypot(way[:, 0], way[:, 1]), CLOSEST)
+        across = np.stack((-way[:, 1], way[:, 0]), axis=1) / r[:, None]
+        along = np.einsum("mij,mj->mi", covariances[:, :, :2], across)
+        variance = np.einsum("mj,mj->m", along[:, :2], across)
+        bent = (0.5 * variance / r > most) & (weights > SPLIT)
+        kept = weights > IMPROBABLE
+        if not bent.any() or kept.sum() + 2 * bent.sum() > MOST:
+            break
+        step = along[bent] / np.sqrt(variance[bent])[:, None]
+        narrow = covariances[bent] - (1.0 - deviation**2) * step[:, :, None] * step[:, None, :]
+        outer = share * weights[bent]
+        kept &= ~bent
+        means = np.concatenate((means[kept], means[bent], means[bent] + distance * step, means[bent] - distance * step))
+        covariances = np.concatenate((covariances[kept], narrow, narrow, narrow))
+        weights = np.concatenate((weights[kept], (1.0 - 2.0 * share) * weights[bent], outer, outer))
+    return means, covariances, weights
 
 
 def pruned(means: Array, covariances: Array, weights: Array) -> tuple[Array, Array, Array]:

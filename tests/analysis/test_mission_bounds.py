@@ -146,7 +146,7 @@ def test_blind_regions_are_blind():
     """On constant courses the map marks every station, and a campaign there comes nowhere near the bound."""
     keys = {name: {"mission": {"pattern": {"amplitude_deg": 0.0}}} for name in ("leader", "follower")}
     keys["leader"]["mission"]["pattern"]["course_deg"] = 20.0
-    (found,) = mission_bounds(load_scenario("leader_follower", vehicles=keys), side=5, span=800.0, after=500.0)
+    (found,) = mission_bounds(load_scenario("leader_follower", vehicles=keys), side=5, span=800.0, after=500.0, draws=0)
     assert found.blind.all()
     assert found.rank.max() == 3
     start = (found.north[0], found.east[0])
@@ -159,7 +159,7 @@ def test_mirror_regions_are_where_a_way_that_hardly_bends_meets_its_image():
         keys = {name: {"mission": {"pattern": {"amplitude_deg": amplitude, "course_deg": course}}}
                 for name, course in (("leader", 20.0), ("follower", 8.0))}  # fmt: skip
         scenario = load_scenario("leader_follower", vehicles=keys)
-        return mission_bounds(scenario, side=9, span=800.0, after=500.0, blind=1e6)[0]
+        return mission_bounds(scenario, side=9, span=800.0, after=500.0, blind=1e6, draws=0)[0]
 
     straight, bent, weaving = bound(0.0), bound(1.0), bound(40.0)
     assert (straight.mirror > 0.02).mean() > 0.9  # no range tells the two apart; where they are one there is no second

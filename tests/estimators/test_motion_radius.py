@@ -18,7 +18,7 @@ from estimators.core.models.process import MotionProcess
 from estimators.core.models.sensors import bearing_to, range_to
 from estimators.core.types import Gaussian, Measurement
 from estimators.motion_radius import batch, paper
-from estimators.motion_radius.bank import BankFilter, pruned, spread_over_currents
+from estimators.motion_radius.bank import SPLIT, BankFilter, pruned, split, spread_over_currents
 from estimators.motion_radius.geometry import second_solution
 from estimators.motion_radius.paper import Packet, PaperFilter
 from estimators.motion_radius.ranges import SHARED, flattened, leader_range
@@ -499,3 +499,30 @@ def test_errors_of_leaders_that_last_are_states():
     assert len(belief.mean) == len(SPACE)
     with pytest.raises(ParameterError, match="memory -1"):
         BankFilter(start, NOISE, memory=-1.0)
+
+
+def test_a_filter_is_split_where_a_range_bends_over_it():
+    """In three with its mean and covariance, along what an error across the range brings with it; others stay."""
+    rng = np.random.default_rng(1)
+    root = rng.standard_normal((9, 9))
+    wide = root @ root.T + np.diag([900.0, 1600.0, *np.full(7, 0.1)])
+    means = np.array([rng.standard_normal(9), rng.standard_normal(9) + 3.0])
+    covariances, weights = np.array([wide, 1e-3 * wide]), np.array([0.7, 0.3])
+    x, P, w = split(means, covariances, weights, 30.0, -80.0, 3.0)
+    assert len(w) > 3
+    assert (w == 0.3).sum() == 1
+    assert w.sum() == pytest.approx(1.0)
+    mixed = w != 0.3
+    shares = w[mixed] / 0.7
+    mean = shares @ x[mixed]
+    spread = np.einsum("m,mij->ij", shares, P[mixed]) + np.einsum(
+        "m,mi,mj->ij", shares, x[mixed] - mean, x[mixed] - mean
+    )
+    assert mean == pytest.approx(means[0], abs=1e-9)
+    assert spread == pytest.approx(wide, rel=1e-9, abs=1e-9)
+    for k in np.flatnonzero(w > SPLIT):
+        way = x[k, :2] - (30.0, -80.0)
+        across = np.array((-way[1], way[0])) / np.hypot(*way)
+        assert 0.5 * across @ P[k, :2, :2] @ across / np.hypot(*way) <= 3.0
+    same = split(means, covariances, weights, 30.0, -80.0, math.inf)
+    assert all(a is b for a, b in zip(same, (means, covariances, weights), strict=True))

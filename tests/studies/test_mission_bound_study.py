@@ -47,7 +47,7 @@ def test_trials_differ_and_are_the_same_again():
 def test_missions_keep_to_the_map():
     """Ten runs at two stations: an rms of ten runs whose errors last is uncertain by some 25 %."""
     for station in (study.STATIONS[1], study.STATIONS[4]):
-        least, rank, _ = study.bound_at(station, 600.0)
+        _, least, rank, _ = study.bound_at(station, 600.0)
         found = [study.run_one(station, 600.0, 77, k) for k in range(10)]
         assert rank == 4
         assert 0.7 < math.sqrt(np.mean([f.square for f in found])) / least < 1.6
