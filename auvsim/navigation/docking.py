@@ -11,13 +11,14 @@ import numpy as np
 from auvsim.acoustics.message import Delivery
 from auvsim.base.alpha_beta import AlphaBeta
 from auvsim.base.errors import InputError
-from auvsim.base.frames import Array, wrap
+from auvsim.base.frames import Array, rotation, wrap
 from auvsim.base.reading import Reading
 from auvsim.navigation import aids
 from auvsim.navigation.estimate import DEPTH_BIAS, PLANAR_STATES, Estimate
 from auvsim.navigation.measurements import measurements, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
 from auvsim.navigation.settings import RobustSettings
+from auvsim.sensors.compass import CompassSettings
 from auvsim.sensors.dvl import DvlSettings
 from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
@@ -65,6 +66,7 @@ class DockingNavigator:
         dock: (2,) north, east of the dock's mouth [m].
         aids: settings of the sensors it uses besides, by name.
         vertical: filter of that state.
+        tilt_noise: standard deviation of the pitch and roll by which bearings of a light are levelled [rad].
     """
 
     def __init__(
@@ -74,9 +76,10 @@ class DockingNavigator:
         dock: Array,
         aids: Mapping[str, Any] | None = None,
         vertical: VerticalFilter | None = None,
+        tilt_noise: float = 0.0,
     ) -> None:
         self._estimator, self._actuation = estimator, actuation
-        self._vertical = vertical or VerticalFilter(UsblModel())
+        self._vertical, self._tilt_noise = vertical or VerticalFilter(UsblModel()), tilt_noise
         self._dock, self._aids = dock, dict(aids or {})
         biases = {f"{name}_bias": _unit(name) for name in estimator.filter.noise.bias_names}
         self.states: Mapping[str, str] = {**PLANAR_STATES, **biases, DEPTH_BIAS: "m"}
@@ -130,6 +133,9 @@ class DockingNavigator:
         self._vertical.gauge(time, now)
         for fix, report in zip(fixes, reports, strict=True):
             self._vertical.fix(fix, report)
+        for reading in aided.values() if result.initialised else ():
+            if isinstance(self._aids[reading.sensor], LightSettings):
+                self._see(reading, self._aids[reading.sensor], result.mean)
         mean, covariance = self._with_depth(result.mean, result.covariance)
         self._yaw_rate = float(mean[5])
         return Estimate(
@@ -147,6 +153,19 @@ class DockingNavigator:
             reinitialised=result.reinitialised,
             outcomes=result.outcomes,
         )
+
+    def _see(self, reading: Reading, settings: LightSettings, mean: Array) -> None:
+        """Takes the elevation of the dock's light, levelled by the compass, for the vertical state."""
+        pitch, roll = self._tilt
+        level = rotation(roll, pitch, 0.0)
+        azimuth, elevation = reading.value.tolist()
+        ahead, abeam, down = (level @ (math.cos(azimuth), math.sin(azimuth), -math.tan(elevation))).tolist()
+        x, y, below = (level @ settings.camera).tolist()
+        cos, sin = math.cos(mean[2]), math.sin(mean[2])
+        distance = math.hypot(mean[0] + cos * x - sin * y, mean[1] + sin * x + cos * y)
+        noise = math.hypot(math.radians(settings.noise_deg), self._tilt_noise)
+        above = math.atan2(-down, math.hypot(ahead, abeam))
+        self._vertical.light(reading.stamp, reading.sensor, above, noise, distance, below)
 
     @property
     def nodes(self) -> Sequence[Node[Any]]:
@@ -216,8 +235,11 @@ def navigator(
     more = {"aids": aids.assumed(used)} if used else {}
     filter_ = kind(setup.parameters, noise, transponder=setup.usbl.transponder[:2], **more)
     estimator = DockingEstimator(filter_, model, step=setup.period, keep=keep, compensate_delay=delayed)
-    vertical = VerticalFilter(model, setup.usbl.transponder[2], keep=keep)
-    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used, vertical)
+    eyes = {name: math.radians(own.bias_deg) for name, own in of_kind(used, LightSettings).items()}
+    vertical = VerticalFilter(model, setup.usbl.transponder[2], keep=keep, lights=eyes)
+    compass = setup.sensors.get("compass")
+    tilt_noise = math.radians(compass.tilt_noise_deg) if isinstance(compass, CompassSettings) else 0.0
+    return DockingNavigator(estimator, actuation, setup.dock.position[:2], used, vertical, tilt_noise)
 
 
 def regular_ekf(setup: NavigatorSetup) -> Navigator:

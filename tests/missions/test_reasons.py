@@ -29,6 +29,7 @@ HARD: dict[str, Any] = {
     },
     "dock's clock ahead": {"acoustics": {"clock_offset": 50.0}},
     "dock's clock behind": {"acoustics": {"clock_offset": -60.0}},
+    "dock's clock 8 s behind": {"acoustics": {"clock_offset": -8.0}},  # its fixes are not too old to be used
     "fixes silent": {"acoustics": {"dropout_probability": 0.98}},
     "ranges alone, gauge wrong": {"sensors": {"usbl": {"enabled": False}, **RANGES, "depth": {"bias": 4.0}}},
 }
@@ -52,6 +53,7 @@ def given(log: Log, vehicle: str | None = None) -> tuple[Judgement, ...]:
         ("current too strong", 0, "current too strong"),  # drifts off on its way to the gate
         ("current too strong", 2, "current too strong"),  # stands still on the approach
         ("dock's clock ahead", 0, "the dock's clock is off"),
+        ("dock's clock 8 s behind", 0, "the dock's clock is off by -"),
         ("fixes silent", 2, "no fix for 180 s"),
         ("ranges alone, gauge wrong", 0, "entrance passed without capture"),  # above the dock, and nothing shows it
     ],
@@ -95,6 +97,8 @@ def test_an_occupied_dock_is():
         ("current too strong", 0, "no progress, {gate:.0f} m from the gate"),  # true to the letter, and not the reason
         ("current too strong", 0, "current too strong for this vehicle: 1.20 m/s, it makes 0.90 m/s"),
         ("dock's clock ahead", 0, "no fix for 180 s"),
+        ("dock's clock ahead", 0, "the dock's clock is off by -8.0 s: no fix for 180 s"),
+        ("fixes silent", 2, "the dock's clock is off by +2.5 s: no fix for 180 s"),
         ("fixes silent", 2, "no fix for 180 s: 33 refused, future: the dock's clock is off"),
         ("fixes silent", 2, "no fix for 900 s"),
         ("ranges alone, gauge wrong", 0, "current too strong for this vehicle: 0.20 m/s, it makes 2.55 m/s"),

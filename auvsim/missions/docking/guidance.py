@@ -20,6 +20,7 @@ from auvsim.missions.docking.columns import COLUMNS, VARIABLES
 from auvsim.missions.docking.decisions import NO_RETURN, SoFar, above_or_below, not_ready, reason_to_break_off
 from auvsim.missions.docking.heard import Heard
 from auvsim.missions.docking.jam import jam_watch
+from auvsim.missions.docking.lag import LagWatch
 from auvsim.missions.docking.metrics import docking_metrics
 from auvsim.missions.docking.path import CLEAR
 from auvsim.missions.docking.relative import Locator, Relative
@@ -70,6 +71,7 @@ class Docking(Mission):
         pose = self.dock.pose
         self._locator = Locator((pose.north, pose.east), setup.vehicle.nose, setup.period)
         self._fixes, self._weave = setup.fixes, STRAIGHT  # what tells where it is; the weave that is flown
+        self._lag = LagWatch()
         self._jam = jam_watch(self.dock.structure, setup.vehicle.nose, setup.fixes)
         self._backs_until = -math.inf  # time until which it backs away from what holds it [s]
         self._limit = math.radians(settings.heading_limit_deg)
@@ -130,7 +132,12 @@ class Docking(Mission):
     def overdue(self, duration: float) -> str:
         """Says that it has not docked in time, and what it was doing."""
         doing = f", waits at the gate: {self._waits_for}" if self._waits_for and self.phase != Phase.SEARCH else ""
-        return f"not docked within {duration:g} s{doing}"
+        return self._with_clock(f"not docked within {duration:g} s{doing}")
+
+    def _with_clock(self, reason: str) -> str:
+        """A reason for giving up, after that the dock's clock is off where the fixes show it."""
+        offset = self._lag.offset()
+        return reason if offset is None else f"the dock's clock is off by {offset:+.1f} s: {reason}"
 
     @classmethod
     def metrics(cls, log: VehicleLog) -> dict[str, Any]:
@@ -144,6 +151,7 @@ class Docking(Mission):
     def update(self, now: Situation) -> Setpoints:
         """The setpoints now."""
         self._observe(now.readings)
+        self._lag.observe(now.readings, now.estimate)
         if now.estimate is not None:
             self._reports.judge(now.estimate)
         for delivery in now.messages:
@@ -199,6 +207,8 @@ class Docking(Mission):
         return Setpoints(wrap(heading + here.compass_bias), depth + here.depth_bias, speed, rudder)
 
     def _enter(self, phase: Phase, time: float, reason: str) -> None:
+        if phase == Phase.ABORTED:
+            reason = self._with_clock(reason)
         self.events.append(Event(time, phase.name.lower(), reason))
         self.phase, self._phase_start, self._nearest = phase, time, (math.inf, time)
 

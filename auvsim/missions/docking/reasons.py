@@ -18,6 +18,7 @@ KINDS = ("aborted", "timeout", "go_around", "jammed")  # of events that give a r
 RIM = 0.1  # inside the mouth's radius, where the hull meets the rim [m]
 RECENT = 10.0  # time for which a contact counts as present [s]
 CLOCK_OFF = 1.0  # offset of a clock that is off [s]
+CLOCK_ERROR = 3.0  # by which a stated offset may be wrong [s]
 CREEPS = 0.3  # speed over ground with which an approach is not worth the name [m/s]
 
 
@@ -111,6 +112,11 @@ def _silent(here: _Moment, seconds: str, refused: str | None, clock: str | None)
     return true, f"{accepted} accepted, {others} refused, the dock's clock {offset:+.1f} s"
 
 
+def _clock(here: _Moment, offset: str) -> tuple[bool, str]:
+    true = float(here.scenario["network"]["acoustics"]["clock_offset"])
+    return abs(true) > CLOCK_OFF and abs(true - float(offset)) < CLOCK_ERROR, f"the dock's clock {true:+.1f} s"
+
+
 def _too_strong(here: _Moment, current: str, fastest: str) -> tuple[bool, str]:
     assert here.dock is not None
     speed, most = math.hypot(*here.current), float(fastest)
@@ -175,6 +181,7 @@ def _jammed(here: _Moment, side: str, along: str, off: str) -> tuple[bool, str]:
 NUMBER = r"([\d.]+)"
 Check = Callable[..., tuple[bool, str]]
 CHECKS: tuple[tuple[str, Check], ...] = (
+    (r"the dock's clock is off by ([-+][\d.]+) s: ", _clock),
     (r"the dock is occupied by '(.+)'", _occupied),
     (rf"no fix for {NUMBER} s(?:: (\d+) refused, [^:]*(: the dock's clock is off)?)?", _silent),
     (rf"current too strong for this vehicle: {NUMBER} m/s, it makes {NUMBER} m/s", _too_strong),
