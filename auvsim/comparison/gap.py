@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import welch
 
-from auvsim.base.errors import InputError
+from auvsim.base.errors import DivergenceError, InputError
 from auvsim.comparison.simulation import in_mujoco, in_planar
 from auvsim.identification.fit import DEFAULT_FREE, Nuisances
 from auvsim.identification.records import Record
@@ -140,7 +140,7 @@ def compare(
         progress: Told the share that is done.
 
     Raises:
-        InputError: No record is long enough, or the vehicle has no rudder.
+        InputError: No record is long enough, the vehicle has no rudder, or cannot move as the record says.
     """
     usable = [record for record in records if record.duration >= LEAST]
     if not usable:
@@ -151,7 +151,14 @@ def compare(
     for k, record in enumerate(usable):
         states = smoothed(record, base, Nuisances().vector())
         surge = float(np.clip(states[0, 3], 0.05, None))
-        velocities = in_mujoco(vehicle, record, surge, measured=measured)
+        try:
+            velocities = in_mujoco(vehicle, record, surge, measured=measured)
+        except DivergenceError:
+            fastest = float(np.abs(record.inputs[:, 1]).max())
+            raise InputError(
+                f"{record.name}: no motion of '{vehicle}' begins at {surge:.3g} m/s or has its shaft at {fastest:.3g} "
+                "rad/s: see the units of surge and shaft speed, such as `n [rpm]`, or give another --vehicle"
+            ) from None
         found.append(Beside(record=record, measured=states, simulated=velocities))
         if parameters is not None:
             walked = in_planar(parameters, record, surge)

@@ -19,6 +19,8 @@ from estimators.planar.model import MAX_SUBSTEP, PlanarParameters, PlanarProcess
 LEAST = 20.0  # of data in all: the vehicle's surge alone takes some 10 s to settle [s]
 SPIN = 1.0  # a turn this fast is none of a vehicle's [rad/s]
 STILL = math.radians(0.3)  # a rudder that moves less than this excites nothing [rad]
+SLOWEST = 10.0  # from one sample of the rudder to the next: most vehicles' yaw has settled by then [s]
+CONSTANT = 3  # samples that stand for a constant of a map
 DEGREE = math.pi / 180.0
 RUDDER = math.radians(45.0)  # largest of vehicles of which nothing is known [rad]
 
@@ -78,6 +80,13 @@ def signals(found: Sequence[Signals], rudder_limit: float = RUDDER, shaft_limit:
 
 
 def _inputs(one: Signals, rudder_limit: float, shaft_limit: float | None) -> None:
+    times = one.signals["rudder"].times
+    usual = float(np.median(np.diff(times)))
+    if len(times) > CONSTANT and usual > SLOWEST:
+        raise InputError(
+            f"{one.name}: the rudder comes every {usual:.3g} s, too seldom to learn how the vehicle answers it: is the "
+            f"time in another unit, such as `time [ms]`? If not, log it once a second, at least every {SLOWEST:g} s"
+        )
     rudder, shaft = one.signals["rudder"].values, one.signals["shaft_speed"].values
     largest = float(np.abs(rudder).max())
     if largest > 1.0 and largest > 3.0 * rudder_limit:

@@ -11,7 +11,7 @@ import numpy as np
 
 from auvsim.base.errors import InputError
 from auvsim.identification import bag_columns, checks, cleaning, places, stamps
-from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, understand
+from auvsim.identification.columns import QUANTITIES, ColumnSettings, Meaning, factor, plain, understand
 from auvsim.identification.records import MEASURED
 from auvsim.identification.signals import Signal, Signals, noise, steep
 from auvsim.identification.table_files import load
@@ -20,6 +20,7 @@ from auvsim.ros import bags
 from estimators.core.types import Array
 
 NEEDED = ("time", "rudder", "shaft_speed")
+NAMING = {"vehicle", "vehicle_id", "vehicle_name", "auv", "robot", "platform", "hull"}  # columns that name vehicles
 TWO = {"shaft_port", "shaft_starboard"}
 _EXAMPLES = {
     "time": "time [s]", "rudder": "rudder [deg]", "shaft_speed": "n [rpm]", "heading or yaw_rate": "heading [deg]",
@@ -88,14 +89,35 @@ def signals(
         notes.append(f"{path.name}: no rudder: its two shafts steer")
     if inputs and not twin and "shaft_speed" not in by_quantity and not constants["shaft_speed"]:
         notes.append(f"{path.name}: no shaft speed: its thrust counts as constant")
+    _one_vehicle(path, columns, unknown)
     found = []
     pieces = list(_pieces(table))
+    if not pieces:
+        raise InputError(f"{path}: the time never goes on from one row to the next; sort the rows by time, or give the "
+                         "right column with --columns")  # fmt: skip
     for number, piece in enumerate(pieces, start=1):
         label = path.name if len(pieces) == 1 else f"{path.name}, {piece.kind or f'part {number}'}"
         one, more = _signals(table, piece, label, inputs)
         found += [one] if one is not None else []
         notes += more
     return found, notes
+
+
+def _one_vehicle(path: Path, columns: Mapping[str, Column], unknown: Sequence[str]) -> None:
+    """Refuses a table whose rows are of several vehicles.
+
+    Raises:
+        InputError: A column that names vehicles names more than one.
+    """
+    for name in unknown:
+        column = columns[name]
+        if plain(name) not in NAMING:
+            continue
+        texts = column.texts if column.texts is not None else column.values[np.isfinite(column.values)]
+        named = sorted({str(value) for value in texts if str(value)})
+        if 1 < len(named) < 0.1 * len(texts):
+            shown = ", ".join(named[:3]) + (", ..." if len(named) > 3 else "")
+            raise InputError(f"{path}: column '{name}' names {len(named)} vehicles, {shown}; give a file for each")
 
 
 def _loaded(path: Path, mapping: Mapping[str, ColumnSettings]) -> bag_columns.Chosen:
@@ -165,7 +187,7 @@ def _pieces(table: _Table) -> Iterator[_Piece]:
     edges = [*sorted(starts), len(time)]
     for start, stop in pairwise(edges):
         inside = time[start:stop][np.isfinite(time[start:stop])]
-        if len(inside) > 1:
+        if len(inside) > 1 and inside.max() > inside.min():
             kind = str(kinds[start]).strip()
             yield _Piece(slice(start, stop), float(inside.min()), float(inside.max()), kind)
 

@@ -110,12 +110,14 @@ def whiten(residual: Array, covariance: Array) -> Array:
 def autocorrelation(innovations: Array, lags: int) -> Array:
     """Normalised autocorrelations (lags,) at lag 1 .. `lags` of whitened innovations (k, m) in time order.
 
-    Of white ones, each is normal with variance 1 / (k m) about 0 (Bar-Shalom, Li, Kirubarajan 2001, 5.4.2).
+    Of white ones, each is normal with variance 1 / (k m) about 0 (Bar-Shalom, Li, Kirubarajan 2001, 5.4.2); of
+    innovations that are all 0 it is 0.
     """
     squares = np.sum(innovations**2, axis=1)
     return np.array(
         [
-            np.sum(innovations[:-lag] * innovations[lag:]) / np.sqrt(squares[:-lag].sum() * squares[lag:].sum())
+            np.sum(innovations[:-lag] * innovations[lag:])
+            / max(np.sqrt(squares[:-lag].sum() * squares[lag:].sum()), np.finfo(float).tiny)
             for lag in range(1, lags + 1)
         ]
     )

@@ -135,3 +135,15 @@ def test_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     ):
         assert main(["compare", *arguments, "--out", str(tmp_path / "out")]) == 2
         assert part in capsys.readouterr().err.strip().splitlines()[-1]
+
+
+def test_a_shaft_in_another_unit_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    """A shaft at a million times its speed is no divergence of the simulation but one line on units."""
+    times = 0.2 * np.arange(400)
+    columns = (times, 10.0 * np.sin(0.3 * times), 1e8 + 1e4 * times, 5.0 * np.sin(0.2 * times), 1.0 + 0.0 * times)
+    rows = [",".join(f"{value:.6g}" for value in row) for row in zip(*columns, strict=True)]
+    lines = ["time [s],rudder [deg],n [rpm],heading [deg],surge [m/s]", *rows]
+    (tmp_path / "fast.csv").write_text("\n".join(lines) + "\n")
+    assert main(["compare", str(tmp_path / "fast.csv"), "--vehicle", "remus100", "--out", str(tmp_path / "out")]) == 2
+    said = capsys.readouterr().err.strip().splitlines()
+    assert "has its shaft at 1.06e+07 rad/s: see the units" in said[-1]

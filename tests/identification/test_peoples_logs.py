@@ -306,3 +306,26 @@ def test_all_that_is_missing_in_one_line(tmp_path: Path) -> None:
     said = str(raised.value)
     for wanted in ("the time", "the rudder", "the heading or yaw rate", "`time [s]`", "`rudder [deg]`", "--columns"):
         assert wanted in said
+
+
+def test_tables_of_no_one_vehicle_and_no_time(tmp_path: Path) -> None:
+    """Rows of two vehicles, rows from last to first, one stamp for all, and a rudder once in 200 s: one line each.
+
+    A column that names one vehicle throughout is none of these.
+    """
+    names = [*TABLE, "vehicle"]
+    with pytest.raises(InputError, match="'vehicle' names 2 vehicles, auv_0, auv_1; give a file for each"):
+        read([text(tmp_path / "two.csv", [";".join(names), *(f"{r};auv_{k % 2}" for k, r in enumerate(rows()))])])
+    found, _ = read_table(text(tmp_path / "one.csv", [";".join(names), *(f"{r};auv_0" for r in rows())]))
+    assert_measured(found)
+    with pytest.raises(InputError, match="time never goes on"):
+        read([text(tmp_path / "back.csv", [";".join(TABLE), *rows()[::-1]])])
+    stamped = dict(TABLE)
+    clock = next(name for name in TABLE if name.startswith("t"))
+    for name, times, said in (
+        ("same", np.full_like(TABLE[clock], 5.0), "time never goes on"),
+        ("slow", 2000.0 * TABLE[clock], r"rudder comes every .* is the time in another unit"),
+    ):
+        stamped[clock] = times
+        with pytest.raises(InputError, match=said):
+            read([write(tmp_path / f"{name}.csv", stamped)])
