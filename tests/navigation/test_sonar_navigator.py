@@ -9,7 +9,6 @@ import pytest
 from auvsim.acoustics.usbl import UsblSettings
 from auvsim.base.reading import Reading
 from auvsim.navigation import registry
-from auvsim.navigation.measurements import averaged
 from auvsim.navigation.navigator import NavigatorSetup
 from auvsim.navigation.settings import SonarSettings
 from auvsim.sensors.altimeter import AltimeterSettings
@@ -104,18 +103,6 @@ def test_a_water_track_is_no_refused_measurement(navigator: Any) -> None:
     estimate = navigator.update(2.5, [compass(2.5), dvl(2.5, 0.0, 0.1)], (), NONE)
     assert estimate.refused == 0
     assert sorted((o.kind, o.accepted) for o in estimate.outcomes) == [("compass", True), ("dvl_bottom", True)]
-
-
-def test_a_lost_track_leaves_the_other_averaged() -> None:
-    """Components that are lost in all readings stay lost; where only some lost them, readings stay single."""
-    ((mean, count),) = averaged([dvl(1.0, 1.2), dvl(1.2, 1.6)])
-    assert count == 2
-    np.testing.assert_allclose(mean.value[:3], (1.4, 0.0, 0.0))
-    assert np.isnan(mean.value[3:]).all()
-    assert mean.stamp == pytest.approx(1.1)
-    assert [n for _, n in averaged([dvl(1.0, 1.2, 0.3), dvl(1.2, 1.6)])] == [1, 1]
-    lost = [Reading("dvl", time, time, np.full(6, math.nan)) for time in (1.0, 1.2)]
-    assert [n for _, n in averaged(lost)] == [1, 1]
 
 
 def test_frames_are_of_the_place_of_the_transducer(navigator: Any) -> None:
