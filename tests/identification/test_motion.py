@@ -284,8 +284,8 @@ def test_the_choice_beats_planar_least_squares(found: MotionIdentification, runs
 def test_no_baseline_is_better_on_the_whole() -> None:
     """The whole choice over six cases of seeds that nothing was tuned on, by geometric means of errors after 60 s.
 
-    Beside the best, chosen afterwards, of least squares, SciPy's output error and its own steps it is 1.08 on these
-    seeds, with a standard error of 0.11: at most 1.25. At most 0.7 of planar least squares, within 60 s of CPU each.
+    Beside the best, chosen afterwards, of least squares, SciPy's output error and its own steps it is at most 1.25:
+    six ratios have a standard error of a tenth. At most 0.7 of planar least squares, within 60 s of CPU each.
     Bands of 95 % hold 85 to 100 % of the predictions of these twelve records: with some five independent ones a record
     the pooled share has a standard deviation of 3.5 %.
     """
