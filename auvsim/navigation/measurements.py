@@ -87,8 +87,8 @@ def _measurement(kind: str, reading: Reading, value: Array, *sigmas: float, **mo
 def averaged(readings: Sequence[Reading]) -> list[tuple[Reading, int]]:
     """Means of the readings of each sensor, at the mean of their stamps, and how many are in each.
 
-    For sensors that are read often, of which the noise is white. Headings of a compass are taken the short way round.
-    Readings of which not the same components are finite, as where a DVL's track is lost between them, stay single.
+    For sensors that are read often, of which the noise is white. Headings of a compass are taken the short way round;
+    where a value is not finite, as of a DVL's lost track, the readings stay single.
     """
     groups: dict[str, list[Reading]] = {}
     for reading in readings:
@@ -96,8 +96,7 @@ def averaged(readings: Sequence[Reading]) -> list[tuple[Reading, int]]:
     means = []
     for group in groups.values():
         values = np.array([r.value for r in group])
-        finite = np.isfinite(values)
-        if len(group) == 1 or not (finite.any() and (finite == finite[0]).all()):
+        if len(group) == 1 or not np.isfinite(values).all():
             means += [(reading, 1) for reading in group]
             continue
         n, first = len(group), values[0]
