@@ -148,7 +148,7 @@ class MotionRadiusSettings(_Assumed):
     clock_drift_ppm: float = Field(default=0.0, ge=0, description="difference of the two clocks' drifts, sd [ppm]")
     sound_speed_error: float = Field(default=0.0, ge=0, description="error of the assumed sound speed, sd [-]")
     memory: float = Field(
-        default=60.0, ge=0, description="time constant of the errors of what others tell of their places; 0: white [s]"
+        default=30.0, ge=0, description="time constant of the errors of what others tell of their places; 0: white [s]"
     )
 
 

@@ -58,7 +58,7 @@ def mean_square(start, seed, amplitudes=(40.0, 40.0), side=7, noises=(2e-2, 1.0)
     }  # fmt: skip
     believed = own[0] + 3.0 * rng.standard_normal(2)
     prior = SPACE.belief({"north": believed[0], "east": believed[1]}, deviations)
-    bank = BankFilter(prior, noise, side=side, memory=50.0)
+    bank = BankFilter(prior, noise, side=side, memory=70.0)
     state = bank.start([Node(0.0, (), [], True)], 0)
     sigma, errors = 1500.0 * 125e-6, leaders_errors(rng)
     squares = []
@@ -69,7 +69,7 @@ def mean_square(start, seed, amplitudes=(40.0, 40.0), side=7, noises=(2e-2, 1.0)
             off = math.hypot(*(own[second] - leader[second]), 2.0)
             r = off + offset + drift * second + sigma * rng.standard_normal()
             told = (*(leader[second] + errors[second]), 12.0)
-            m = leader_range(r, told, deviation=sigma, leader_deviation=math.sqrt(0.2), stamp=float(second), depth=10.0)
+            m = leader_range(r, told, deviation=sigma, leader_deviation=math.sqrt(0.14), stamp=float(second), depth=10.0)
             state = bank.correct(state, float(second), [m])
         if second > 500 and second % 8 == 4:
             squares.append(float(((state.belief.mean[:2] - own[second]) ** 2).sum()))
@@ -80,7 +80,7 @@ def leaders_errors(rng):
     """Errors (t, 2) [m] of a filter of fixes of 1 m each 10 s and a random walk, as the scenario's leader has it."""
     error, P, found = np.zeros(2), 1e6, []
     for second in range(int(END) + 1):
-        error, P = error + math.sqrt(4e-3) * rng.standard_normal(2), P + 4e-3
+        error, P = error + math.sqrt(2e-3) * rng.standard_normal(2), P + 2e-3
         if second % 10 == 0 and second > 0:
             K = P / (P + 1.0)
             error, P = (1.0 - K) * error + K * rng.standard_normal(2), (1.0 - K) * P
@@ -118,11 +118,11 @@ def test_what_is_told_errs_as_the_leaders_filter_says_and_lasts_as_long_as_that_
     for kept, added in zip(told.kept, told.added, strict=True):
         error = kept**2 * error + added
         variance.append(error)
-    q, R = 4e-3 * 10.0, 1.0
+    q, R = 2e-3 * 10.0, 1.0
     after = 0.5 * (-q + math.sqrt(q * q + 4.0 * q * R))
-    assert variance[0] == pytest.approx(R + 4e-3 * 2.0)  # the first fix is all it has
+    assert variance[0] == pytest.approx(R + 2e-3 * 2.0)  # the first fix is all it has
     assert min(variance[-25:]) == pytest.approx(after, rel=1e-6)
-    assert max(variance[-25:]) == pytest.approx(after + 4e-3 * 8.0, rel=1e-6)
+    assert max(variance[-25:]) == pytest.approx(after + 2e-3 * 8.0, rel=1e-6)
     gain = after / R
     assert np.prod(told.kept[-50:]) == pytest.approx((1.0 - gain) ** 40, rel=1e-9)  # 400 s: 50 packets, 40 fixes
     assert told.density == pytest.approx(10.0)
