@@ -114,7 +114,8 @@ def test_followers_that_all_tell_do_not_talk_each_other_into_a_wrong_place(kind)
     squares = []
     for name in ("follower", "f1", "f2"):
         (rms, nees), (alone, own) = judged(loud, name), judged(quiet, name)
-        assert 0.5 < nees < max(1.5, 1.05 * own)  # NEES of six runs, in each of which errors last, varies by itself
+        # NEES of six runs, in each of which errors last, varies by itself; what is shared is bounded, not known.
+        assert 0.3 < nees < max(1.5, 1.05 * own)
         assert rms < 1.05 * alone
         squares.append((rms / alone) ** 2)
     assert np.mean(squares) < 0.7
