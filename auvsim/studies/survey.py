@@ -8,7 +8,7 @@ after the rotation about it that brings the path closest to the true one.
 
 import gc
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Any, NamedTuple
@@ -31,6 +31,9 @@ RECKONING, OPEN, CLOSED, WHOLE = "dead reckoning", "sonar, no closures", "sonar"
 FIXED = "sonar, path after a second fix"
 PINNED = {"vehicles": {"remus100": {"mission": {"second_fix": True}}}}
 BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
+
+
+_FIX = "; fix: that path after a second fix"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -189,43 +192,76 @@ def report(options: Options, progress: Progress | None = None) -> Sequence[Rende
     pinned = PINNED if options.second_fix else None
     tasks = [Task(key=(k,), work=partial(run_one, options.seed, k, pinned)) for k in range(options.trials)]
     done = run_tasks(tasks, options.jobs, progress)
-    return [table([done[k,] for k in range(options.trials)], options)]
+    trials = [done[k,] for k in range(options.trials)]
+    return [turned_table(trials, options), raw_table(trials, options)]
 
 
-def table(trials: Sequence[Trial], options: Options) -> Table:
-    """A row a mission and one of all: errors turned and raw, floor, NEES by estimator, closures, docked."""
-    title = f"survey, seed {options.seed}: rms over the lanes, in m; DR dead reckoning, S sonar, -C without closures"
-    shown = Table(
-        title=title,
-        caption="turned: from the dive point on, rotated about it; path: of the keyframes when the lanes are done"
-        + ("; fix: that path after a second fix" if options.second_fix else ""),
-    )
-    more = ("S fix",) if options.second_fix else ()
-    headings = ("trial", "turned: DR", "S-C", "S", "S path", *more, "S / DR", "path / DR", "raw: DR", "S-C", "S",
-                "S path", *more, "floor", "NEES: DR", "S-C", "S", "closures", "docked")  # fmt: skip
-    for heading in headings:
+def turned_table(trials: Sequence[Trial], options: Options) -> Table:
+    """A row a mission and one of all: errors from the dive point on after the rotation about it, and what it led to."""
+    return _table(
+        trials,
+        Table(
+            title=f"survey, seed {options.seed}: rms error over the lanes after the rotation about the dive point, in m",
+            caption="path: of the keyframes when the lanes are done" + _FIX * options.second_fix,
+        ),
+        ("dead reckoning", "no closures", "sonar", "path", *_fixed(options), "sonar / d. r.", "path / d. r.",
+         "closures", "docked"),
+        partial(_turned, names=_names(options)),
+    )  # fmt: skip
+
+
+def raw_table(trials: Sequence[Trial], options: Options) -> Table:
+    """A row a mission and one of all: errors as they are, their floor, and NEES."""
+    return _table(
+        trials,
+        Table(
+            title="the same without that rotation, in m, and mean NEES of the position per degree of freedom",
+            caption="floor: the compass' constant error times the distance from the dive point",
+        ),
+        ("dead reckoning", "no closures", "sonar", "path", *_fixed(options), "floor", "NEES d. r.", "NEES no closures",
+         "NEES sonar"),
+        partial(_raw, names=_names(options)),
+    )  # fmt: skip
+
+
+def _fixed(options: Options) -> tuple[str, ...]:
+    return ("fix",) if options.second_fix else ()
+
+
+def _names(options: Options) -> tuple[str, ...]:
+    return (RECKONING, OPEN, CLOSED, WHOLE, *((FIXED,) if options.second_fix else ()))
+
+
+def _table(
+    trials: Sequence[Trial], shown: Table, headings: Sequence[str], cells: Callable[[Sequence[Trial]], Sequence[str]]
+) -> Table:
+    for heading in ("trial", *headings):
         shown.add_column(heading, justify="right")
     for k, trial in enumerate(trials):
-        shown.add_row(
-            str(k), *_cells([trial], options.second_fix), str(trial.closures), "yes" if trial.docked else "no"
-        )
+        shown.add_row(str(k), *cells([trial]))
     shown.add_section()
-    docked = f"{sum(t.docked for t in trials)} of {len(trials)}"
-    shown.add_row("all", *_cells(trials, options.second_fix), f"{np.mean([t.closures for t in trials]):.0f}", docked)
+    shown.add_row("all", *cells(trials))
     return shown
 
 
-def _cells(trials: Sequence[Trial], second_fix: bool) -> list[str]:
-    """Rms over missions of errors, and mean NEES."""
+def _turned(trials: Sequence[Trial], names: Sequence[str]) -> list[str]:
+    """Rms over missions of errors, their ratios, the mean number of closures, and how many docked."""
+    values = _together(trials, names, "turned")
+    numbers = [f"{value:.2f}" for value in (*values, values[2] / values[0], values[3] / values[0])]
+    docked = sum(t.docked for t in trials)
+    said = f"{docked} of {len(trials)}" if len(trials) > 1 else ("yes" if docked else "no")
+    return [*numbers, f"{np.mean([t.closures for t in trials]):.0f}", said]
 
-    def together(name: str, field: str) -> float:
-        return _root([getattr(t.errors[name], field) if name in t.errors else math.nan for t in trials])
 
-    names = (RECKONING, OPEN, CLOSED, WHOLE, *((FIXED,) if second_fix else ()))
-    turned_, raw = ([together(name, field) for name in names] for field in ("turned", "raw"))
+def _raw(trials: Sequence[Trial], names: Sequence[str]) -> list[str]:
+    """Rms over missions of errors and of their floor, and mean NEES."""
     nees = [float(np.mean([t.errors[name].nees for t in trials])) for name in names[:3]]
-    values = (*turned_, turned_[2] / turned_[0], turned_[3] / turned_[0], *raw, _root([t.floor for t in trials]), *nees)
+    values = (*_together(trials, names, "raw"), _root([t.floor for t in trials]), *nees)
     return [f"{value:.2f}" for value in values]
+
+
+def _together(trials: Sequence[Trial], names: Sequence[str], field: str) -> list[float]:
+    return [_root([getattr(t.errors[n], field) if n in t.errors else math.nan for t in trials]) for n in names]
 
 
 def _root(values: Sequence[float]) -> float:

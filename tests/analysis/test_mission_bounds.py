@@ -69,7 +69,9 @@ def mean_square(start, seed, amplitudes=(40.0, 40.0), side=7, noises=(2e-2, 1.0)
             off = math.hypot(*(own[second] - leader[second]), 2.0)
             r = off + offset + drift * second + sigma * rng.standard_normal()
             told = (*(leader[second] + errors[second]), 12.0)
-            m = leader_range(r, told, deviation=sigma, leader_deviation=math.sqrt(0.14), stamp=float(second), depth=10.0)
+            m = leader_range(
+                r, told, deviation=sigma, leader_deviation=math.sqrt(0.14), stamp=float(second), depth=10.0
+            )
             state = bank.correct(state, float(second), [m])
         if second > 500 and second % 8 == 4:
             squares.append(float(((state.belief.mean[:2] - own[second]) ** 2).sum()))

@@ -6,8 +6,22 @@ import math
 import numpy as np
 import pytest
 from rich.console import Console
+from rich.table import Table
 
-from auvsim.studies.survey import CLOSED, FIXED, OPEN, RECKONING, WHOLE, Errors, Options, Trial, judged, table, turned
+from auvsim.studies.survey import (
+    CLOSED,
+    FIXED,
+    OPEN,
+    RECKONING,
+    WHOLE,
+    Errors,
+    Options,
+    Trial,
+    judged,
+    raw_table,
+    turned,
+    turned_table,
+)
 
 AT = np.array((40.0, -7.0))
 TRUE = AT + np.array([(0.0, 1.0), (60.0, 2.0), (61.0, 9.0), (3.0, 30.0), (-8.0, 12.0)])
@@ -46,14 +60,20 @@ def test_the_table_sets_each_error_under_its_name() -> None:
         for f in (1.0, 7.0)
     ]  # fmt: skip
     for second in (False, True):
-        shown = table(both, Options(trials=2, second_fix=second))
-        console = Console(width=300, record=True, file=io.StringIO())
-        console.print(shown)
-        row = next(line for line in console.export_text().splitlines() if "2 of 2" in line)
-        cells = [cell.strip() for cell in row.split("\u2502")[2:-1]]
-        by_name = list(zip([str(column.header) for column in shown.columns][1:], cells, strict=True))
-        assert by_name[0] == ("turned: DR", "15.00")  # the root of (9 + 441) / 2
-        assert ("S / DR", "3.00") in by_name
-        assert ("path / DR", "4.00") in by_name
-        assert [value for name, value in by_name if name == "S fix"] == (["75.00", "125.00"] if second else [])
-        assert ("NEES: DR", "0.10") in by_name
+        options = Options(trials=2, second_fix=second)
+        by_name = _last_row(turned_table(both, options))
+        assert by_name["dead reckoning"] == "15.00"  # the root of (9 + 441) / 2
+        assert (by_name["sonar / d. r."], by_name["path / d. r."]) == ("3.00", "4.00")
+        assert (by_name["closures"], by_name["docked"]) == ("20", "2 of 2")
+        assert by_name.get("fix") == ("75.00" if second else None)
+        by_name = _last_row(raw_table(both, options))
+        assert (by_name["dead reckoning"], by_name["floor"], by_name["NEES d. r."]) == ("25.00", "0.50", "0.10")
+        assert by_name.get("fix") == ("125.00" if second else None)
+
+
+def _last_row(shown: Table) -> dict[str, str]:
+    console = Console(width=120, record=True, file=io.StringIO())
+    console.print(shown)
+    row = next(line for line in console.export_text().splitlines() if line.split("\u2502")[1:2] == ["   all "])
+    cells = [cell.strip() for cell in row.split("\u2502")[1:-1]]
+    return dict(zip([str(column.header) for column in shown.columns], cells, strict=True))
