@@ -201,7 +201,7 @@ def turned_table(trials: Sequence[Trial], options: Options) -> Table:
     return _table(
         trials,
         Table(
-            title=f"survey, seed {options.seed}: rms error over the lanes after the rotation about the dive point, in m",
+            title=f"survey, seed {options.seed}: rms over the lanes after the rotation about the dive point, in m",
             caption="path: of the keyframes when the lanes are done" + _FIX * options.second_fix,
         ),
         ("dead reckoning", "no closures", "sonar", "path", *_fixed(options), "sonar / d. r.", "path / d. r.",

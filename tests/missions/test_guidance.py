@@ -1,7 +1,7 @@
 """Guidance laws against vector sums, the phase machine with hand-made estimates, and a point vehicle all the way in."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -13,6 +13,7 @@ from auvsim.control.controller import Setpoints
 from auvsim.missions.docking.guidance import CLEAR, Docking, DockingSettings, Phase, approach_course
 from auvsim.missions.line_of_sight import heading_for_course
 from auvsim.navigation.estimate import Estimate
+from estimators.core.types import Outcome
 
 LIMITED = DockingSettings(fix_timeout=30.0, uncertain_timeout=10.0)
 LIMIT = math.radians(SETTINGS.heading_limit_deg)
@@ -306,6 +307,7 @@ def test_in_steady_water_the_speed_is_as_ever() -> None:
 def test_gives_up_when_lost(fixed: bool) -> None:
     """No fix for `lost_timeout`, whether there ever was one or not."""
     guidance, start = new(), 0.0
+    update(guidance, start, None, 0.0, 5.0, False)
     if fixed:
         Script(guidance, time=49.9).tick(-300.0)
         start = 50.0
@@ -314,6 +316,21 @@ def test_gives_up_when_lost(fixed: bool) -> None:
     assert update(guidance, start + 180.1, None, 0.0, 5.0, False).speed == 0.0
     assert guidance.phase == Phase.ABORTED
     assert guidance.events[-1].text == "no fix for 180 s"
+
+
+def test_silence_counts_from_when_a_docking_begins() -> None:
+    """One that begins late, as a survey's does, is not lost because its first fix is refused."""
+    guidance, begun = new(), 1320.0
+    refused = Outcome("usbl", "", begun - 1.0, 0, False, "outlier", 30.0)
+    here = replace(estimate(begun, -60.0, 0.0, 0.0), outcomes=(refused,))
+    update(guidance, begun, here, 0.0, DOCK_DEPTH, fixes=[fix(begun)])
+    assert guidance.phase != Phase.ABORTED
+    later = begun + 179.0
+    update(guidance, later, estimate(later, -60.0, 0.0, 0.0), 0.0, DOCK_DEPTH)
+    assert guidance.phase != Phase.ABORTED
+    update(guidance, later + 2.0, estimate(later + 2.0, -60.0, 0.0, 0.0), 0.0, DOCK_DEPTH)
+    assert guidance.phase == Phase.ABORTED
+    assert guidance.events[-1].text == "no fix for 181 s: 1 refused, outlier"
 
 
 RADIUS = 16.0  # tightest turn of the REMUS 100 model at any speed: 15.8 m at full rudder [m]

@@ -29,6 +29,10 @@ class Heard(DockReports):
         self._arrivals: deque[tuple[int, float]] = deque(maxlen=NUMBERED)  # number and time of the dock's packets [s]
         self._refused: Counter[str] = Counter()  # fixes refused since one was last accepted, by reason
 
+    def begin(self, time: float) -> None:
+        """Counts silence from a time on [s], at which listening begins."""
+        self.last, self._used = max(self.last, time), max(self._used, time)
+
     def observe(self, readings: Sequence[Reading]) -> None:
         """Takes the dock's packets and the ranges among readings."""
         super().observe(readings)
@@ -53,7 +57,7 @@ class Heard(DockReports):
                     self._refused[outcome.reason] += 1
 
     def silence(self, time: float) -> float:
-        """Time since a fix was last of use [s]."""
+        """Time since a fix was last of use, or since listening began [s]."""
         return time - (self._used if self._judges else self.last)
 
     @property
