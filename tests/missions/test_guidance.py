@@ -326,9 +326,9 @@ def test_silence_counts_from_when_a_docking_begins() -> None:
     update(guidance, begun, here, 0.0, DOCK_DEPTH, fixes=[fix(begun)])
     assert guidance.phase != Phase.ABORTED
     later = begun + 179.0
-    update(guidance, later, estimate(later, -60.0, 0.0, 0.0), 0.0, DOCK_DEPTH)
+    update(guidance, later, None, 0.0, DOCK_DEPTH)
     assert guidance.phase != Phase.ABORTED
-    update(guidance, later + 2.0, estimate(later + 2.0, -60.0, 0.0, 0.0), 0.0, DOCK_DEPTH)
+    update(guidance, later + 2.0, None, 0.0, DOCK_DEPTH)
     assert guidance.phase == Phase.ABORTED
     assert guidance.events[-1].text == "no fix for 181 s: 1 refused, outlier"
 
