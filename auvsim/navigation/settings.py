@@ -113,6 +113,12 @@ class SonarSettings(ReckoningSettings):
     keyframes: int = Field(
         default=2, ge=1, le=1000, description="matched frames from one that is kept for closures to the next"
     )
+    nearer: float = Field(
+        default=0.15,
+        ge=0,
+        le=5,
+        description="by which echoes come from before the middle of rocks; 0 over a floor without any [m]",
+    )
     keep: float = Field(default=10.0, gt=0, description="age up to which measurements are used [s]")
 
 

@@ -81,7 +81,7 @@ class SonarNavigator(ReckoningNavigator):
             half_sector=half,
             ahead=settings.nose,
         )
-        self._frames = SectorFrames(polar=polar, grid=grid)
+        self._frames = SectorFrames(polar=polar, grid=grid, nearer=setup.settings.nearer)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
         model = FrameModel(
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)

@@ -21,7 +21,6 @@ SURROUNDINGS = 1.0  # standard deviation of the Gaussian over which their mean i
 LEAST_HEARD = 100  # cells within the sonar's ranges, fewer and a frame shows nothing
 BLANK = 1e-9  # spread of a frame below which it shows nothing
 LEAST = 1e-9  # intensity by the mean of its frame below which the logarithm is cut
-NEARER = 0.15  # by which echoes come from before the middle of rocks: from the sides that face the sonar [m]
 FAINT = 1e-4  # square of a value by their mean below which its logarithm says nothing of the spread
 
 
@@ -31,6 +30,7 @@ class SectorFrames:
 
     polar: PolarGrid  # of the sonar, its ranges slant
     grid: SectorGrid
+    nearer: float = 0.0  # by which echoes come from before the middle of rocks, along the slant range [m]
 
     def frame(self, intensity: np.ndarray, *, altitude: float, stamp: float, sequence: int | None = None) -> SonarFrame:
         """The standardised frame of a ping.
@@ -51,7 +51,7 @@ class SectorFrames:
     def _on_the_floor(self, intensity: Array, altitude: float) -> Array:
         """Intensities (beams, ranges) at even horizontal ranges, interpolated; the last ones held."""
         slant, horizontal = np.array(self.polar.ranges), np.array(self._floor.ranges)
-        at = (np.hypot(horizontal, altitude) - NEARER - slant[0]) / (slant[1] - slant[0])
+        at = (np.hypot(horizontal, altitude) - self.nearer - slant[0]) / (slant[1] - slant[0])
         at = np.clip(at, 0.0, len(slant) - 1.0)
         before = np.minimum(at.astype(int), len(slant) - 2)
         share = at - before

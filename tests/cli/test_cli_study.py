@@ -45,7 +45,8 @@ def test_help_tells_the_options(name: str, capsys: pytest.CaptureFixture) -> Non
     [
         (
             ["docing"],
-            "no study 'docing'; there are comparison, docking, envelope, formation, held_out, identification",
+            "no study 'docing'; there are comparison, docking, docking_bound, envelope, formation, held_out, "
+            "identification",
         ),
         (["docking", "--trails", "3"], "Unrecognized options: --trails, 3; see auvsim study docking --help"),
         (["docking", "--trials", "x"], "invalid literal for int() with base 10: 'x'"),

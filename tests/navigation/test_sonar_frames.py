@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 
-from auvsim.navigation.sonar_frames import NEARER, SectorFrames
+from auvsim.navigation.sonar_frames import SectorFrames
 from estimators.map_path.frames import EMPTY, NOT_FINITE, PolarGrid, SectorGrid, fault
 
 GRID = SectorGrid(cell=0.5, shape=(40, 80), ranges=(1.0, 20.0), half_sector=np.radians(60.0))
 POLAR = PolarGrid(
     bearings=tuple(np.radians(np.linspace(-60.0, 60.0, 121)).tolist()), ranges=tuple(np.arange(1.0, 21.0, 0.1).tolist())
 )
-MAKER = SectorFrames(polar=POLAR, grid=GRID)
+NEARER = 0.15
+MAKER = SectorFrames(polar=POLAR, grid=GRID, nearer=NEARER)
 
 
 def speckle(seed: int) -> np.ndarray:
