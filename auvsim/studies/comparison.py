@@ -10,12 +10,9 @@ from typing import Any, Literal
 from rich.console import RenderableType
 from rich.table import Table
 
-from auvsim.analysis.statistics import wilson
 from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.navigation.registry import ESTIMATORS as FACTORIES
-from auvsim.studies.trials import Summary, docking_trial
-
-LATER = 3  # attempts that the default guidance has
+from auvsim.studies.trials import LATER, Summary, docking_trial, share
 
 _HALF = {"speed": 0.5, "direction_deg": {"uniform": [-180.0, 180.0]}}
 _TURN = {"kind": "approach_turn", **_HALF}
@@ -128,8 +125,8 @@ def table(study: Mapping[tuple[str, str], Sequence[Summary]], seed: int) -> Tabl
         result.add_row(
             "" if cell == previous else cell,
             name,
-            _share(s.first, s.trials),
-            _share(s.within, s.trials),
+            share(s.first, s.trials, 0),
+            share(s.within, s.trials, 0),
             f"{s.miss_rms:.2f}",
             f"{s.position_rms:.2f}",
             f"{s.nees_per_dof:.2f}",
@@ -150,13 +147,6 @@ def report(options: Options, progress: Progress | None = None) -> list[Renderabl
         if not s.docked
     ]
     return [table(study, options.seed), *failures]
-
-
-def _share(successes: int, trials: int) -> str:
-    """Formats a rate with its 95 % Wilson interval."""
-    low, high = wilson(successes, trials)
-    rate = 100.0 * successes / trials if trials else math.nan
-    return f"{rate:.0f} ({100.0 * low:.0f}-{100.0 * high:.0f})"
 
 
 def _mean(pairs: Sequence[tuple[float, float]]) -> float:

@@ -16,9 +16,7 @@ from auvsim.base.errors import InputError
 from auvsim.base.tasks import Progress, Task, run_tasks
 from auvsim.simulation import sampling
 from auvsim.simulation.loading import find
-from auvsim.studies.trials import Summary, docking_trial
-
-LATER = 3  # attempts that the default guidance has
+from auvsim.studies.trials import LATER, Summary, docking_trial
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,12 +11,9 @@ from typing import Any
 from rich.console import RenderableType
 from rich.table import Table
 
-from auvsim.analysis.statistics import wilson
 from auvsim.base.errors import unknown_name
 from auvsim.base.tasks import Progress, Task, run_tasks
-from auvsim.studies.trials import Summary, docking_trial
-
-LATER = 3  # attempts that the default guidance has
+from auvsim.studies.trials import LATER, Summary, docking_trial, share
 
 _EAST = {"kind": "uniform", "direction_deg": {"uniform": [-180.0, 180.0]}}
 _POOR = {"compass": {"heading_bias_deg": 3.0}, "usbl": {"dock_heading_bias_deg": 3.0}}
@@ -188,13 +185,6 @@ def report(options: Options, progress: Progress | None = None) -> list[Renderabl
         for text, count in score(summaries).reasons.most_common()
     ]
     return [table(study, options.seed), *failures]
-
-
-def share(successes: int, trials: int) -> str:
-    """A rate in percent with its 95 % Wilson interval."""
-    low, high = wilson(successes, trials)
-    rate = 100.0 * successes / trials if trials else math.nan
-    return f"{rate:.1f} ({100.0 * low:.0f}-{100.0 * high:.0f})"
 
 
 def _rms(values: Sequence[float | None]) -> float:

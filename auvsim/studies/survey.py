@@ -33,9 +33,6 @@ PINNED = {"vehicles": {"remus100": {"mission": {"second_fix": True}}}}
 BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
 
 
-_FIX = "; fix: that path after a second fix"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Options:
     """Options of the command."""
@@ -202,7 +199,8 @@ def turned_table(trials: Sequence[Trial], options: Options) -> Table:
         trials,
         Table(
             title=f"survey, seed {options.seed}: rms over the lanes after the rotation about the dive point, in m",
-            caption="path: of the keyframes when the lanes are done" + _FIX * options.second_fix,
+            caption="path: of the keyframes when the lanes are done"
+            + ("; fix: that path after a second fix" if options.second_fix else ""),
         ),
         ("dead reckoning", "no closures", "sonar", "path", *_fixed(options), "sonar / d. r.", "path / d. r.",
          "closures", "docked"),

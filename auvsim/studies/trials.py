@@ -1,16 +1,20 @@
 """Docking trials and manoeuvres that studies run."""
 
 import dataclasses
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from auvsim.analysis.estimates import EstimateQuality
+from auvsim.analysis.statistics import wilson
 from auvsim.analysis.summary import summarise
 from auvsim.data import log
 from auvsim.simulation import sampling, scenario
 from auvsim.simulation.run import run
+
+LATER = 3  # attempts that the default guidance has
 
 
 @dataclass(frozen=True, kw_only=True, slots=True)
@@ -56,6 +60,13 @@ def docking_trial(seed: int, trial: int, *pinned: Mapping[str, Any]) -> Summary:
         plan = sampling.merge(plan, values)
     found = run(scenario.parse(sampling.draw(plan, seed, trial)), seed=seed, trial=trial)
     return Summary.of(summarise(found.vehicle()))
+
+
+def share(successes: int, trials: int, decimals: int = 1) -> str:
+    """A rate in percent with its 95 % Wilson interval."""
+    low, high = wilson(successes, trials)
+    rate = 100.0 * successes / trials if trials else math.nan
+    return f"{rate:.{decimals}f} ({100.0 * low:.0f}-{100.0 * high:.0f})"
 
 
 def record_manoeuvre(kind: str, seed: int, path: Path, pinned: Mapping[str, Any]) -> None:

@@ -86,7 +86,7 @@ class Docking(Mission):
         self._leg = 1  # of the path to a gate: 0 back out of the funnel, 1 round the dock, 2 to the gate
         self._waits_for = ""  # what keeps the vehicle at a gate
         self._returns = 0  # to a gate without an attempt counted
-        self._phase_start, self._begun = 0.0, False
+        self._phase_start = 0.0
         self._nearest = (math.inf, 0.0)  # least distance to the gate [m] and when that was [s]
         self._paced: tuple[Relative | None, int, float] = (None, 0, 0.0)  # place and attempt of the last speed, and it
         self._pace = 1.0  # factor on the speed over ground of an approach, for a fix to come in time
@@ -150,8 +150,7 @@ class Docking(Mission):
 
     def update(self, now: Situation) -> Setpoints:
         """The setpoints now."""
-        if not self._begun:
-            self._begun = True
+        if self._hold is None:  # the first call
             self._reports.begin(now.time)
         self._observe(now.readings)
         self._lag.observe(now.readings, now.estimate)
