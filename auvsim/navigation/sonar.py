@@ -214,14 +214,22 @@ class SonarNavigator(ReckoningNavigator):
 
     def _more(self) -> list[Measurement]:
         """The frames of the images, and a mark where the dive begins."""
-        altitude = self._altitude + self._frames.grid.ahead * math.sin(self._tilt[0])
+        above = self._frames.grid.ahead * math.sin(self._tilt[0])
         frames = [
             self._frames.frame(
-                reading.image, altitude=altitude, stamp=reading.stamp, sequence=reading.sequence
+                reading.image,
+                altitude=self._altitude_of(reading) + above,
+                stamp=reading.stamp,
+                sequence=reading.sequence,
             ).measurement()
             for reading in self._images
         ]
         return [*frames, *self._marks]
+
+    def _altitude_of(self, image: Reading) -> float:
+        """Altitude where a frame was taken [m]."""
+        depth = None if image.received <= image.stamp else self._depth.at(image.stamp)
+        return self._altitude if depth is None else self._floor - depth
 
     def _dive_mark(self, time: float) -> list[Measurement]:
         """Has the pose kept where the first fixes end."""

@@ -15,6 +15,7 @@ from auvsim.data.variables import Variable
 from auvsim.physics.truth import Truth
 from auvsim.sensors import sonar_array, sonar_echo
 from auvsim.sensors.sensor import Sensor, Surroundings
+from auvsim.sensors.sonar_faults import FaultSettings, spoiled
 from auvsim.water.terrain_grid import GriddedFloor
 
 FRAME = Variable(("beam", "bin"), "int8", "0.5 dB", "level above the noise in the middle of the ranges", "body")
@@ -88,6 +89,7 @@ class ImagingSonarSettings(Settings):
         default=0.02, ge=0.0, le=1.0, description="power of the path by the surface by the direct one's [-]"
     )
     speckle: bool = Field(default=True, description="whether each sample has the exponential law of many scatterers")
+    faults: FaultSettings = Field(default=FaultSettings(), description="Frames that go wrong.")
     log_frames: bool = Field(default=False, description="whether the log holds all frames, some 20 kB each")
     nose: float = Field(
         default=0.0, ge=-20.0, le=20.0, description="place of its transducer ahead of the body's origin [m]"
@@ -159,6 +161,8 @@ class ImagingSonar(Sensor):
         self.bearings, self.ranges = geometry(settings)
         settings = resolved(settings)
         self.settings, self._generator = settings, generator
+        # A stream of their own, so that noise is the same with faults and without.
+        self._chances = generator.spawn(1)[0] if settings.faults.total else None
         self.width = (settings.maximum_range - settings.minimum_range) / settings.bins  # of a bin [m]
         spacing = float(self.bearings[1] - self.bearings[0])
         self._weights = sonar_echo.pattern(spacing, math.radians(settings.beam_width_deg))
@@ -186,15 +190,28 @@ class ImagingSonar(Sensor):
         facing = height / distance
         return facing**2 * ground * self._beam[0] * along * math.exp(-2.0 * self.absorption * distance) / distance**4
 
-    def measure(self, truth: Truth, world: Surroundings) -> Reading:
-        """Takes a frame: `image` has the intensities (beams, bins), `value` what the log holds of it."""
-        frame = self.image(truth, world)
-        if self.settings.log_frames:
-            value: Any = np.clip(np.rint(2.0 * self.level(frame)), -128, 127).astype(np.int8)
-        else:
+    def measure(self, truth: Truth, world: Surroundings) -> Reading | None:
+        """Takes a frame: `image` has the intensities (beams, bins), `value` what the log holds of it.
+
+        A frame that goes missing has a number in the sequence, too; one that is late is `received` then.
+        """
+        faults = self.settings.faults
+        fault = faults.of(float(self._chances.random())) if self._chances is not None else None
+        frame = spoiled(self.image(truth, world), fault)
+        reading = self._reading(truth.time, self._logged(frame))
+        if fault == "missing":
+            return None
+        return reading._replace(image=frame, received=truth.time + (faults.delay if fault == "late" else 0.0))
+
+    def _logged(self, frame: np.ndarray) -> Any:
+        """What the log holds of a frame; of one that has not its size, no sample at all."""
+        if not self.settings.log_frames:
             mean = float(frame.mean())
-            value = np.array((mean, float(frame.max()) / max(mean, 1e-300)))
-        return self._reading(truth.time, value)._replace(image=frame)
+            return np.array((mean, float(frame.max()) / max(mean, 1e-300)))
+        if frame.shape != self._mean.shape:
+            return np.full(self._mean.shape, -128, dtype=np.int8)
+        levels = np.where(np.isfinite(frame), 2.0 * self.level(frame), -128.0)
+        return np.clip(np.rint(levels), -128, 127).astype(np.int8)
 
     def level(self, frame: np.ndarray) -> np.ndarray:
         """Intensities as levels above the noise in the middle of the ranges [dB]."""
