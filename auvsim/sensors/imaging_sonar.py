@@ -238,7 +238,7 @@ class ImagingSonar(Sensor):
         hits, facing = self._met(world, place, pose, fan)
         if hits.size:
             sonar_echo.hide(depths, grid, pose, self.bearings, self.width, fan, hits)
-        self._narrow[:] = self._echoes(hits, facing, pose[4], fan) if hits.size else 0.0
+        self._narrow[:] = self._echoes(hits, facing, pose, fan) if hits.size else 0.0
         sonar_echo.scan(
             depths,
             strength,
@@ -288,18 +288,21 @@ class ImagingSonar(Sensor):
         found = world.rays(place, directions.reshape(-1, 3), self.settings.maximum_range)
         return None if found is None else (found[0].reshape(-1, count), found[1].reshape(-1, count))
 
-    def _echoes(self, hits: Array, facing: Array, axis: float, fan: Array) -> Array:
-        """Intensities (beams, bins) of what rays (beams, e) meet, see `_met`, for an axis below the horizon [rad]."""
+    def _echoes(self, hits: Array, facing: Array, pose: Array, fan: Array) -> Array:
+        """Intensities (beams, bins) of what rays (beams, e) meet from a pose, see `_met` and `sonar_echo.scan`."""
         echoes = np.zeros(self._narrow.shape)
         count = hits.shape[1]
         met = (hits >= self.settings.minimum_range) & (hits < self.settings.maximum_range)
         b, e = np.nonzero(met)
-        distance = hits[met]
+        distance, below = hits[met], _middles(fan, count)[e]
         sharpness = 8.0 * math.log(2.0) / self._high**2
-        aside = _middles(fan, count)[e] - axis
-        share = np.exp(-sharpness * aside**2 - 2.0 * self.absorption * distance) / distance**2
+        share = np.exp(-sharpness * (below - pose[4]) ** 2 - 2.0 * self.absorption * distance) / distance**2
         share *= self._beam[0] * float(fan[1] - fan[0]) / count * OBJECT_ECHO * facing[met]
-        np.add.at(echoes, (b, ((distance - self.settings.minimum_range) / self.width).astype(int)), share)
+        mirrored = np.hypot(distance * np.cos(below), distance * np.sin(below) + 2.0 * pose[2])  # back by the surface
+        for path, power in ((distance, 1.0), (0.5 * (distance + mirrored), self.settings.ghost)):
+            heard = path < self.settings.maximum_range
+            bins = ((path[heard] - self.settings.minimum_range) / self.width).astype(int)
+            np.add.at(echoes, (b[heard], bins), power * share[heard])
         return echoes
 
 

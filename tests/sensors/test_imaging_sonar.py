@@ -230,6 +230,20 @@ def test_second_path_by_the_surface() -> None:
     assert ghost.sum() == pytest.approx(0.1 * direct.sum(), rel=0.35)
 
 
+def test_an_object_has_a_second_path_too() -> None:
+    """A ball in mid water, far above the floor: a tenth of its echo comes again by half the way by the surface."""
+    world = Drawn(terrain=FlatFloor(500.0)).holding('<geom type="sphere" group="1" size="0.3" pos="9 0 -7"/>')
+    place = at(0.0, 0.0, 4.0)
+    found = [
+        sonar(**WIDE | {"ghost": g}, bins=200, maximum_range=25.0, beams=61).mean(place, world) for g in (0.0, 0.1)
+    ]
+    direct, ghost = found[0][30], (found[1] - found[0])[30]
+    assert ghost.sum() == pytest.approx(0.1 * direct.sum(), rel=1e-6)
+    R = sonar(**WIDE, bins=200, maximum_range=25.0, beams=61).ranges
+    near, far = (math.hypot(9.0, z) - 0.3 for z in (3.0, 11.0))
+    assert R[np.flatnonzero(ghost)[0]] == pytest.approx(0.5 * (near + far), abs=0.3)  # other points of the ball
+
+
 def test_speckle_is_exponential_and_new_in_each_frame() -> None:
     """Intensity by its mean follows the exponential law (Kolmogorov-Smirnov), and two pings are independent."""
     one = sonar(5, beams=128, bins=200, snr=10.0)
