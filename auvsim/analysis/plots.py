@@ -3,6 +3,7 @@
 Figures are made without pyplot, so nothing global (backend, style, open figures) is touched.
 """
 
+import math
 import os
 from typing import Any
 
@@ -46,6 +47,7 @@ from auvsim.data.log import StructureLog, VehicleLog
 from auvsim.data.phases import phase_at
 from auvsim.missions.docking.dock_frame import funnel_outline, in_dock_frame, nose_position
 
+RESOLVED = 350  # claims that a panel shows side by side
 ZOOM = 30.0  # length of the last part in the dock's frame [m]
 ESTIMATE: dict[str, Any] = {"color": "black", "linestyle": (0, (5, 2)), "linewidth": 1.0, "label": "estimate"}
 
@@ -236,15 +238,30 @@ def _consistency(quality: EstimateQuality) -> str:
 
 def _error(axes: Axes, errors: EstimateErrors, error: Array, sigma: Array, free: NDArray[np.bool_]) -> None:
     seen = errors.initialised & np.isfinite(error)
-    time, band = errors.time[seen], 2.0 * sigma[seen]
+    time, band = resolved(errors.time[seen], 2.0 * sigma[seen])
     axes.fill_between(time, -band, band, facecolor=BAND, edgecolor=BAND_EDGE, lw=0.9)
-    axes.plot(time, error[seen], color="#1a1a1a", lw=1.1)
+    axes.plot(errors.time[seen], error[seen], color="#1a1a1a", lw=1.1)
     axes.axhline(0.0, color="#888888", lw=0.7)
     free = seen & free
     if free.any():
         # Neither the first, uninformed band nor the blows of contact and latch may flatten the rest.
         limit = max(*np.percentile(np.abs(error[free]), [99.0]), *np.percentile(2.0 * sigma[free], [90.0]), 1e-6)
         axes.set(ylim=(-1.2 * limit, 1.2 * limit))
+
+
+def resolved(time: Array, deviation: Array, most: int = RESOLVED) -> tuple[Array, Array]:
+    """Claimed deviations (n,) at times (n,) [s], their rms over as many neighbours as a panel cannot tell apart.
+
+    Where a filter's ticks find a sensor's last reading now fresh, now old, its claims rise and fall from tick to tick,
+    and their outline would be a solid block. An even number of ticks is taken together, which levels such a pair.
+    """
+    together = 2 * math.ceil(len(time) / (2 * most))
+    if len(time) <= most:
+        return time, deviation
+    whole = len(time) - len(time) % together
+    means = np.sqrt(np.mean(np.square(deviation[:whole]).reshape(-1, together), axis=1))
+    middles = time[:whole].reshape(-1, together).mean(axis=1)
+    return np.r_[time[:1], middles, time[-1:]], np.r_[means[:1], means, means[-1:]]
 
 
 def _nees(axes: Axes, log: VehicleLog, errors: EstimateErrors) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from auvsim.analysis.bad_frames import bad_frames
 from auvsim.analysis.estimates import estimate_errors, estimate_quality
 from auvsim.analysis.heard import heard_vehicles, relative_to
 from auvsim.base import plugins
@@ -41,6 +42,8 @@ def summarise(log: VehicleLog) -> dict[str, Any]:
             "fixes_outliers": int((usbl["outlier"] & ~usbl["lost"]).sum()),
         }
     values["fixes_refused"] = int(log["estimate"]["refused"].max(initial=0))
+    if bad := bad_frames(log):
+        values["bad_frames"] = bad
     end, wall = end_of(log), float(log.log.attributes.get(WALL_TIME, math.nan))
     values["real_time_factor"] = end / wall if wall > 0.0 else None
     return _plain(values)

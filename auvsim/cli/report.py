@@ -195,6 +195,10 @@ def show(summary: Mapping[str, Any]) -> None:
     for key, label in rows.items():
         if any(values.get(key) is not None for values in vehicles.values()):
             table.add_row(label, *(_text(values.get(key)) for values in vehicles.values()))
+    if any("bad_frames" in values for values in vehicles.values()):
+        table.add_row(
+            "bad frames of the sonar", *(_counts(values.get("bad_frames", {})) for values in vehicles.values())
+        )
     phases = dict.fromkeys(phase for values in vehicles.values() for phase in values["estimate"])
     for phase in phases:
         where = "all phases" if phase == "all" else phase.replace("_", " ")
@@ -215,6 +219,10 @@ def _of_its_own(kind: str) -> dict[str, str]:
     except InputError:  # its class is not here any more, or declares nothing that can be used
         return {}
     return {key: f"{m.meaning} [{m.units}]" if m.units not in ("", "1") else m.meaning for key, m in columns.items()}
+
+
+def _counts(numbers: Mapping[str, int]) -> str:
+    return ", ".join(f"{count} {what.replace('_', ' ')}" for what, count in numbers.items())
 
 
 def _errors(quality: Mapping[str, Any] | None) -> str:

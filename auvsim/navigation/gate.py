@@ -16,12 +16,14 @@ from auvsim.sensors.feedback import FeedbackSettings
 from auvsim.sensors.fix import FixSettings
 from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
+from auvsim.sensors.imaging_sonar import ImagingSonarSettings, resolved
 from auvsim.sensors.imu import ImuSettings
 from auvsim.sensors.light import LightSettings
 from auvsim.sensors.range import RangeSettings
 from auvsim.vehicles.actuation import Actuation
 from estimators.core.screening import Limits, Screen, judge
 from estimators.core.types import Outcome
+from estimators.map_path.frames import WRONG_SIZE, fault
 
 SURE = 11.0  # deviations of white noise by which two readings never differ: 8 of their difference
 EQUAL = 20  # readings in a row that a sensor with noise never repeats
@@ -42,7 +44,8 @@ class Gate:
     """Judges readings by what their sensors can show, see `estimators.core.screening`.
 
     Only what cannot be is refused: no number, a value beyond any vehicle, a jump, a value that stays the same to the
-    last bit, a stamp from the future or before the last one. A DVL's track that is lost is none of these.
+    last bit, a stamp from the future or before the last one. A DVL's track that is lost is none of these. Frames of a
+    sonar are refused if they are empty, not finite, saturated or not of its size; they may come in any order.
 
     Args:
         sensors: Settings of those on board by name; others pass.
@@ -57,10 +60,19 @@ class Gate:
             if (limits := _limits(settings, actuation, frozen))
         }
         self._dvls = {name for name, settings in sensors.items() if isinstance(settings, DvlSettings)}
+        self._frames = {
+            name: (own.beams, own.bins)
+            for name, settings in sensors.items()
+            if isinstance(settings, ImagingSonarSettings) and (own := resolved(settings))
+        }
         self.refused: dict[str, int] = {}  # in a row, by sensor
 
     def judge(self, reading: Reading) -> str:
         """Why a reading is to be refused; "" if it is not."""
+        if (shape := self._frames.get(reading.sensor)) is not None and reading.image is not None:
+            # Speckle never repeats: samples that share the largest value are at the receiver's limit.
+            frame = reading.image
+            return fault(frame, math.prod(shape), float(frame.max())) if frame.shape == shape else WRONG_SIZE
         screens = self._screens.get(reading.sensor)
         if screens is None:
             return ""

@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from estimators.core.history import Node
 from estimators.core.models import sensors
 from estimators.core.models.motion import Motion, constant_velocity, with_error
 from estimators.core.models.process import MotionProcess
+from estimators.core.states import StateSpace
 from estimators.core.types import Gaussian, Measurement, Models
 from estimators.docking.aids import BOTTOM, GYRO, RANGE
 from estimators.docking.sensors import COMPASS
@@ -91,7 +93,7 @@ class ReckoningNavigator(OverHistory):
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         """The filter behind its delay buffer."""
-        return Estimator(ModelFilter(process, models, self._start, gates=0.9999), step=setup.period)
+        return Estimator(ModelFilter(process, models, self._beginning(), gates=0.9999), step=setup.period)
 
     def _known(self) -> dict[str, float]:
         """Deviations at the start of what no reading shows at once."""
@@ -129,14 +131,15 @@ class ReckoningNavigator(OverHistory):
         result = self._estimator.tick(time, (), [*found, *self._more()])
         n = len(self._space)
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
-        mean = belief.mean
+        # Copied: it may be a part of the state with all frames' poses, which a log would then hold at every tick.
+        mean, covariance = belief.mean.copy(), belief.covariance.copy()
         return Estimate(
             time=time,
             position=np.array((mean[0], mean[1], self._depth.at(time) or 0.0)),
             heading=float(mean[2]),
             velocity=mean[3:6],
             current=np.zeros(2),
-            covariance=belief.covariance,
+            covariance=covariance,
             initialised=result.belief is not None,
             mean=mean,
             names=tuple(self.states),
@@ -158,28 +161,60 @@ class ReckoningNavigator(OverHistory):
             sequence=fix.sequence,
         )  # fmt: skip
 
-    def _start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
-        """At the first node with a fix and a compass at or before it; at the first compass, where nothing locates."""
+    def _beginning(self) -> "Start":
+        """What a filter begins with."""
+        return Start(
+            space=self._space,
+            positions=self.positions,
+            located=self._located,
+            deviation=UNKNOWN if self._ranged else 0.0,
+            compass_bias=self._compass_bias,
+            known=self._known(),
+            doubt=self._doubt,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Start:
+    """The belief at the first node with a fix and a compass at or before it; at the first compass, if nothing locates.
+
+    It knows no navigator: the two would hold each other, and all frames that a filter keeps, long after a run.
+    """
+
+    space: StateSpace
+    positions: tuple[str, ...]  # kinds of measurement that are one of the position
+    located: bool  # whether there is a sensor of one
+    deviation: float  # of the position where no fix is [m]
+    compass_bias: float  # deviation [rad]
+    known: Mapping[str, float]  # deviations of the other states
+    doubt: float  # deviation of a first fix that may be an outlier [m]
+    slow: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # states that are errors of a position, by kind
+
+    def __call__(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+        """The belief and the measurements that it is made of; None where those of the node do not suffice."""
         node = nodes[index]
         earlier = [m for other in nodes[: index + 1] for m in other.measurements if m.kind == COMPASS]
         fix = next((m for m in node.measurements if m.kind in self.positions), None)
-        if not earlier or (self._located and fix is None):
+        if not earlier or (self.located and fix is None):
             return None
-        deviation = UNKNOWN if self._ranged else 0.0
         known = {
-            "heading": math.hypot(self._compass_bias, math.sqrt(earlier[-1].covariance.item())),
-            "north": deviation,
-            "east": deviation,
-            **self._known(),
+            "heading": math.hypot(self.compass_bias, math.sqrt(earlier[-1].covariance.item())),
+            "north": self.deviation,
+            "east": self.deviation,
+            **self.known,
         }
-        belief = self._space.belief({"heading": float(earlier[-1].value[0])}, known)
+        belief = self.space.belief({"heading": float(earlier[-1].value[0])}, known)
         mean, covariance = belief.mean, belief.covariance
-        psi, bias = self._space.index("heading"), self._space.index("compass_bias")
+        psi, bias = self.space.index("heading"), self.space.index("compass_bias")
         covariance[psi, bias] = covariance[bias, psi] = -(
-            self._compass_bias**2
+            self.compass_bias**2
         )  # it shows too much: so does the heading
         if fix is not None:
-            mean[:2], covariance[:2, :2] = fix.value, fix.covariance + self._doubt**2 * np.eye(2)
+            mean[:2], covariance[:2, :2] = fix.value, fix.covariance + self.doubt**2 * np.eye(2)
+            for axis, name in enumerate(self.slow.get(fix.kind, ())):
+                k = self.space.index(name)
+                covariance[axis, axis] += covariance[k, k]
+                covariance[axis, k] = covariance[k, axis] = -covariance[k, k]
         return belief, [m for m in node.measurements if m is fix or m is earlier[-1]]
 
 

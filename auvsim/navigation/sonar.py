@@ -15,7 +15,7 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.measurements import FIX, averaged, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
-from auvsim.navigation.reckoning import ReckoningNavigator
+from auvsim.navigation.reckoning import ReckoningNavigator, Start
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.sensors.altimeter import AltimeterSettings
 from auvsim.sensors.dvl import DvlSettings
@@ -24,11 +24,10 @@ from auvsim.sensors.gps import GpsSettings
 from auvsim.sensors.gyro import GyroSettings
 from auvsim.sensors.imaging_sonar import ImagingSonarSettings, geometry
 from estimators.core.estimator import Estimator
-from estimators.core.history import Node
 from estimators.core.models import sensors
 from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
-from estimators.core.types import Gaussian, Measurement, Models
+from estimators.core.types import Measurement, Models
 from estimators.docking.aids import WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
@@ -118,7 +117,7 @@ class SonarNavigator(ReckoningNavigator):
             self._matcher,
             process,
             models,
-            self._start,
+            self._beginning(),
             gates=dict.fromkeys(models, 0.9999),
             window=WINDOW,
             keyframes=keyframes,
@@ -137,16 +136,9 @@ class SonarNavigator(ReckoningNavigator):
         wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
         return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), **wander}
 
-    def _start(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
+    def _beginning(self) -> Start:
         """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""
-        found = super()._start(nodes, index)
-        if found is not None and any(m.kind == GPS for m in found[1]):
-            covariance = found[0].covariance
-            for axis, name in enumerate(GPS_ERRORS):
-                k = self._space.index(name)
-                covariance[axis, axis] += covariance[k, k]
-                covariance[axis, k] = covariance[k, axis] = -covariance[k, k]
-        return found
+        return replace(super()._beginning(), slow={} if self._gps is None else {GPS: GPS_ERRORS})
 
     def reset(self) -> None:
         """Forgets everything."""
@@ -214,14 +206,22 @@ class SonarNavigator(ReckoningNavigator):
 
     def _more(self) -> list[Measurement]:
         """The frames of the images, and a mark where the dive begins."""
-        altitude = self._altitude + self._frames.grid.ahead * math.sin(self._tilt[0])
+        above = self._frames.grid.ahead * math.sin(self._tilt[0])
         frames = [
             self._frames.frame(
-                reading.image, altitude=altitude, stamp=reading.stamp, sequence=reading.sequence
+                reading.image,
+                altitude=self._altitude_of(reading) + above,
+                stamp=reading.stamp,
+                sequence=reading.sequence,
             ).measurement()
             for reading in self._images
         ]
         return [*frames, *self._marks]
+
+    def _altitude_of(self, image: Reading) -> float:
+        """Altitude where a frame was taken [m]."""
+        depth = None if image.received <= image.stamp else self._depth.at(image.stamp)
+        return self._altitude if depth is None else self._floor - depth
 
     def _dive_mark(self, time: float) -> list[Measurement]:
         """Has the pose kept where the first fixes end."""

@@ -31,7 +31,7 @@ def _bilinear(field, at_north, at_east):
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out):
+def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, fan, hits, out):
     """Adds to `out` (beams, bins) the mean intensity of each beam and range, before the receiver's gain.
 
     Along each beam the floor is walked from near to far. A point is seen where no nearer one stands higher in the
@@ -47,8 +47,9 @@ def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out
         beam: (2,) width in bearing that a beam stands for, width of the beam in elevation at half power [rad].
         loss: (bins,) share of the power that comes back from each range, spreading and absorption both ways.
         ghost: power of the path by the surface by that of the direct one.
-        hits: (b, e) range at which each beam meets an object [m], infinite where it meets none, at e elevations that
-            are evenly spread over the beam from high to low; (b, 0) without objects.
+        fan: (2,) angles below the horizon between which `hits` were looked for [rad].
+        hits: (b, e) range at which each beam meets an object [m], infinite where it meets none, in the middle of e
+            equal parts of the fan from high to low; (b, 0) without objects.
         out: to which it is added.
     """
     number, count = out.shape
@@ -88,11 +89,12 @@ def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out
             facing = (h - s * (to_north * ahead + to_east * aside)) / distance
             if facing <= 0.0:
                 continue
-            below = math.atan(slope) - axis
+            below = math.atan(slope)
             if elevations:
-                e = int((below / high + 0.5) * elevations)
+                e = int((below - fan[0]) / (fan[1] - fan[0]) * elevations)
                 if 0 <= e < elevations and hits[b, e] < distance:
                     continue
+            below -= axis
             # Lambert's law on an area of s wide width sqrt(tilt).
             echo = facing * facing * s * wide * width / math.sqrt(tilt) * math.exp(-sharpness * below * below)
             if not plain:
@@ -113,6 +115,32 @@ def scan(depths, strength, grid, pose, beams, bins, beam, loss, ghost, hits, out
                 late = int((0.5 * (distance + mirrored) - first) / width)
                 if late < count:
                     out[b, late] += ghost * echo
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def hide(depths, grid, pose, beams, width, fan, hits):
+    """Makes those `hits` infinite that lie behind the sea floor; arguments as of `scan`, `width` that of a bin."""
+    number, elevations = hits.shape
+    north, east, depth = pose[0], pose[1], pose[2]
+    for b in range(number):
+        farthest = 0.0
+        for e in range(elevations):
+            if hits[b, e] < np.inf:
+                farthest = max(farthest, hits[b, e])
+        steps = int(farthest / width)
+        horizon = np.full(steps + 1, 1e30)  # least depth by distance of the floor before the end of each step
+        ahead, aside = math.cos(pose[3] + beams[b]), math.sin(pose[3] + beams[b])
+        for k in range(steps):
+            s = (k + 0.5) * width
+            floor = _bilinear(depths, (north + s * ahead - grid[0]) / grid[2], (east + s * aside - grid[1]) / grid[3])[
+                0
+            ]
+            horizon[k + 1] = min(horizon[k], (floor - depth) / s)
+        for e in range(elevations):
+            if hits[b, e] < np.inf:
+                below = fan[0] + (fan[1] - fan[0]) * (e + 0.5) / elevations
+                if math.tan(below) > horizon[int(hits[b, e] * math.cos(below) / width)]:
+                    hits[b, e] = np.inf
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")

@@ -142,6 +142,7 @@ class Agent:
         self.commands: Any = ahead(start.speed)
         self._filter_ticks = round(rates.control / rates.filter)
         self._readings: list[Reading] = []  # of this control period
+        self._on_their_way: list[Reading] = []  # taken, and received later
         self._messages: list[Delivery] = []
         self._to_filter: list[Reading] = []  # since the last update of the estimator
         self._messages_to_filter: list[Delivery] = []
@@ -195,7 +196,10 @@ class Agent:
                 if part.own:
                     parts.reading(reading, sensor)
                 log.reading(self.name, reading)
-                taken.append(reading)
+                (taken if reading.received <= truth.time else self._on_their_way).append(reading)
+        if self._on_their_way:
+            taken += [reading for reading in self._on_their_way if reading.received <= truth.time]
+            self._on_their_way = [reading for reading in self._on_their_way if reading.received > truth.time]
         suspects = set(self.gate.refused)
         self._readings, refused = self.gate.passed(taken)
         self._gated += refused

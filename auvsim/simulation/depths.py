@@ -9,6 +9,7 @@ from auvsim.missions.formation.settings import FormationSettings
 from auvsim.missions.track.mission import TrackSettings
 from auvsim.missions.track.patterns import Circle, Weave, points
 from auvsim.water.seabed import SeabedSettings
+from auvsim.water.terrain_grid import GriddedFloor
 
 if TYPE_CHECKING:
     from auvsim.simulation.scenario import Scenario
@@ -21,24 +22,32 @@ def check_depths(scenario: "Scenario") -> None:
         InputError: one is not; the text begins with its dotted key.
     """
     terrain = scenario.world.floor
-    if isinstance(scenario.water.terrain, SeabedSettings):
-        _check_floor(scenario, scenario.water.terrain)
+    if isinstance(terrain, GriddedFloor):
+        _check_floor(scenario, terrain)
     for key, north, east, depth in _places(scenario):
         floor = terrain.depth(north, east)
         if not 0.0 < depth < floor:
             raise InputError(f"{key}: {depth:g} m is not between the surface and the sea floor at {floor:g} m")
 
 
-def _check_floor(scenario: "Scenario", floor: SeabedSettings) -> None:
-    """Sees that something of the scenario is on or near a generated floor, beside which the sea floor is even."""
-    (x, y), near = floor.center, 1.5 * 0.5 * floor.extent
-    places = [(north, east) for _, north, east, _ in _places(scenario)]
-    if places and all(max(abs(north - x), abs(east - y)) > near for north, east in places):
-        away = min(math.hypot(north - x, east - y) for north, east in places)
+def _check_floor(scenario: "Scenario", floor: GriddedFloor) -> None:
+    """Sees that something of the scenario is on or near a gridded floor, beside which the sea floor is even."""
+    (south, north), (west, east) = floor.bounds
+    near = 0.25 * max(north - south, east - west)
+    places = [(x, y) for _, x, y, _ in _places(scenario)]
+    if not places or any(south - near <= x <= north + near and west - near <= y <= east + near for x, y in places):
+        return
+    if isinstance(settings := scenario.water.terrain, SeabedSettings):
+        away = min(math.hypot(x - settings.center[0], y - settings.center[1]) for x, y in places)
         raise InputError(
-            f"water.terrain.center: the generated sea floor of {floor.extent:g} m lies {away:.0f} m from the nearest "
-            "vehicle, waypoint or structure; move it there or give a larger extent"
+            f"water.terrain.center: the generated sea floor of {settings.extent:g} m lies {away:.0f} m from the "
+            "nearest vehicle, waypoint or structure; move it there or give a larger extent"
         )
+    raise InputError(
+        f"water.terrain: the grid from north {south:.0f} to {north:.0f} m, east {west:.0f} to {east:.0f} m holds no "
+        "vehicle, waypoint or structure; give northing and easting (or latitude and longitude) of the datum, where "
+        "north and east are 0, in the grid"
+    )
 
 
 def _places(scenario: "Scenario") -> Iterator[tuple[str, float, float, float]]:

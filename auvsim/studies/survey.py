@@ -6,7 +6,6 @@ judged from the dive point on, as it is believed at the time (what is learnt lat
 after the rotation about it that brings the path closest to the true one.
 """
 
-import gc
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -99,7 +98,6 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
         trial: number of the mission under that seed.
         pinned: values of the scenario on top of its own.
     """
-    gc.collect()  # the frames of the mission before, half a gigabyte in reference cycles
     scenario = load_scenario("survey", **(pinned or {}))
     simulation = Simulation(scenario, seed, trial, record=False)
     (agent,) = simulation.agents

@@ -1,4 +1,4 @@
-"""Reads gridded currents from NetCDF files, classic or NetCDF-4, by the CF conventions."""
+"""Reads gridded currents, and variables of any kind, from NetCDF files, classic or NetCDF-4, by the CF conventions."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""A sea floor made from a seed: fractal roughness, ripples, rocks, a pipeline; depths and echo strength on a grid.
+"""A sea floor made from a seed: fractal roughness, ripples, rocks, debris, a pipeline; on a grid.
 
 The roughness is a Gaussian field whose spectrum falls with a power of the wave number (Jackson and Richardson 2007,
 High-Frequency Seafloor Acoustics, ch. 6), drawn by a fast Fourier transform.
@@ -22,6 +22,7 @@ MOST_CELLS = 4097 * 4097
 MOST_ROCKS = 200_000
 ROCK_ECHO = 10.0  # backscatter of rock by that of sand: some 10 dB at grazing angles of 10 to 60 deg (ibid., fig. G.1)
 PIPE_ECHO = 15.0  # of a steel or concrete pipe; assumed
+DEBRIS_ECHO = 15.0  # of boxes, drums and beams of steel; assumed
 
 
 class PipelineSettings(Settings):
@@ -49,8 +50,12 @@ class SeabedSettings(Settings):
     ripple_height: float = Field(default=0.0, ge=0.0, le=1.0, description="from trough to crest [m]")
     ripple_length: float = Field(default=1.0, ge=0.1, le=50.0, description="from crest to crest [m]")
     ripple_direction_deg: float = Field(default=0.0, description="across the crests, from north [deg]")
-    rocks: float = Field(default=0.01, ge=0.0, le=1.0, description="number of rocks and debris [1/m2]")
+    rocks: float = Field(default=0.01, ge=0.0, le=1.0, description="number of rocks [1/m2]")
     rock_radius: float = Field(default=0.3, gt=0.0, le=5.0, description="their median; sizes are log-normal [m]")
+    debris: float = Field(default=0.0, ge=0.0, le=1.0, description="number of boxes and beams that lie about [1/m2]")
+    debris_length: float = Field(
+        default=1.0, gt=0.0, le=20.0, description="their median; a third as wide and a quarter as high [m]"
+    )
     pipeline: PipelineSettings | None = Field(default=None, description="none: there is none")
 
     @model_validator(mode="after")
@@ -61,11 +66,12 @@ class SeabedSettings(Settings):
                 f"extent {self.extent:g} m at spacing {self.spacing:g} m has {cells:.2g} points, at most "
                 f"{MOST_CELLS:.2g}: give a spacing of {self.extent / (math.sqrt(MOST_CELLS) - 1.0):.2g} m or more"
             )
-        if (rocks := self.rocks * self.extent**2) > MOST_ROCKS:
-            raise ValueError(
-                f"rocks: {self.rocks:g} 1/m2 on {self.extent:g} m squared are {rocks:.2g}, at most {MOST_ROCKS}: give "
-                f"{MOST_ROCKS / self.extent**2:.2g} or less"
-            )
+        for key, density in (("rocks", self.rocks), ("debris", self.debris)):
+            if (count := density * self.extent**2) > MOST_ROCKS:
+                raise ValueError(
+                    f"{key}: {density:g} 1/m2 on {self.extent:g} m squared are {count:.2g}, at most {MOST_ROCKS}: give "
+                    f"{MOST_ROCKS / self.extent**2:.2g} or less"
+                )
         waves = {"longest": self.roughness and self.longest, "ripple_length": self.ripple_height and self.ripple_length}
         for key, length in waves.items():
             if 0.0 < length < 2.0 * self.spacing:
@@ -103,6 +109,7 @@ def make(settings: SeabedSettings, sea_floor: float) -> GriddedFloor:
     strength = np.ones((count, count), dtype=np.float32)
     _lay_pipeline(settings, axis, heights, strength)
     _place_rocks(settings, axis, heights, strength, stream(settings.seed, 0, "seabed/rocks"))
+    _place_debris(settings, axis, heights, strength, stream(settings.seed, 0, "seabed/debris"))
     depths = sea_floor - heights
     if depths.min() < 0.5:
         raise InputError(
@@ -172,3 +179,22 @@ def _place_rocks(
         on = rise > 0.0
         heights[i0:i1, j0:j1] += rise
         strength[i0:i1, j0:j1][on] = ROCK_ECHO
+
+
+def _place_debris(
+    settings: SeabedSettings, axis: Array, heights: Array, strength: np.ndarray, generator: Generator
+) -> None:
+    """Boxes on the floor as it is there, each turned its own way."""
+    count = generator.poisson(settings.debris * settings.extent**2)
+    places = generator.uniform(axis[0], axis[-1], (count, 2))
+    lengths = settings.debris_length * np.exp(0.4 * generator.standard_normal(count))
+    turns = generator.uniform(0.0, math.pi, count)
+    for (north, east), length, turn in zip(places.tolist(), lengths.tolist(), turns.tolist(), strict=True):
+        half = 0.5 * length
+        i0, i1 = np.searchsorted(axis, (north - half, north + half))
+        j0, j1 = np.searchsorted(axis, (east - half, east + half))
+        n, e = axis[i0:i1, None] - north, axis[None, j0:j1] - east
+        along, across = n * math.cos(turn) + e * math.sin(turn), e * math.cos(turn) - n * math.sin(turn)
+        on = (np.abs(along) < half) & (np.abs(across) < length / 6.0)
+        heights[i0:i1, j0:j1][on] += 0.25 * length
+        strength[i0:i1, j0:j1][on] = DEBRIS_ECHO

@@ -29,6 +29,12 @@ class GriddedFloor:
     depths: Array  # (n, m) by north and east [m]
     strength: NDArray[np.float32] | None = None  # (n, m) backscatter by that of sand; none: sand everywhere
 
+    @property
+    def bounds(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """Its ends in north, and in east [m]."""
+        (south, west, to_north, to_east), (rows, columns) = self.corner, self.depths.shape
+        return (south, south + to_north * (rows - 1)), (west, west + to_east * (columns - 1))
+
     def depth(self, north: float, east: float) -> float:
         """Depth of the sea floor [m] at a place in NED [m]."""
         i, s = _cell((north - self.corner.north) / self.corner.to_north, self.depths.shape[0])

@@ -1,4 +1,5 @@
 import dataclasses
+import math
 import subprocess
 import sys
 from collections.abc import Callable
@@ -25,7 +26,7 @@ from synthetic import (
 
 from auvsim.analysis.estimates import NEES_INTERVAL, estimate_errors, fix_fates, fixes
 from auvsim.analysis.fleet_plots import fleet, fleet_figure
-from auvsim.analysis.plots import estimates, estimates_figure, track, track_figure
+from auvsim.analysis.plots import estimates, estimates_figure, resolved, track, track_figure
 from auvsim.analysis.style import DPI, MOST_IN_ROW, SIZE, phase_colour, vehicle_colour
 from auvsim.base.errors import InputError
 from auvsim.base.frames import rotation
@@ -161,7 +162,8 @@ def test_error_panels_hold_errors_bands_and_ticks(log: VehicleLog, errors: Any):
         axes = panel(errors, title)
         np.testing.assert_array_equal(axes.get_lines()[0].get_ydata(), error[seen])
         band = axes.collections[0].get_paths()[0].vertices[:, 1]
-        assert (band.min(), band.max()) == pytest.approx((-2.0 * sigma[seen].max(), 2.0 * sigma[seen].max()))
+        claimed = 2.0 * resolved(expected.time[seen], sigma[seen])[1].max()
+        assert (band.min(), band.max()) == pytest.approx((-claimed, claimed))
         low, high = axes.get_ylim()
         assert np.mean((error[seen] > low) & (error[seen] < high)) >= 0.98  # single blows may leave the picture
         ticks = [len(collection.get_paths()) for collection in axes.collections[1:3]]
@@ -275,3 +277,18 @@ def test_no_folder_is_an_input_error(tmp_path: Path):
 def test_nothing_global_is_touched():
     code = "import sys, auvsim.analysis.plots; assert 'matplotlib.pyplot' not in sys.modules, 'pyplot'"
     subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_claims_that_rise_and_fall_from_tick_to_tick_are_shown_as_their_rms() -> None:
+    """Of a pair, level whatever its phase; a step stays where it is, few claims stay as they are."""
+    time = 0.5 * np.arange(2701)
+    claims = np.where(np.arange(2701) % 2, 0.07, 0.02)
+    claims[1500:] += 1.0
+    shown_at, shown = resolved(time, claims)
+    assert len(shown) <= 2 * 350
+    assert (shown_at[0], shown_at[-1]) == (time[0], time[-1])
+    before, after = shown[shown_at < 747.0], shown[shown_at > 753.0]
+    np.testing.assert_allclose(before, math.sqrt((0.07**2 + 0.02**2) / 2.0))
+    np.testing.assert_allclose(after, math.sqrt((1.07**2 + 1.02**2) / 2.0))
+    few = resolved(time[:350], claims[:350])
+    np.testing.assert_array_equal(few[1], claims[:350])

@@ -1,6 +1,8 @@
 """The navigator of surveys: what a mean of readings weighs, GPS whose slow error is a state, what it leaves out."""
 
+import gc
 import math
+import weakref
 from typing import Any
 
 import numpy as np
@@ -31,15 +33,31 @@ SENSORS: dict[str, Any] = {
 NONE: Any = None
 
 
+def setup() -> NavigatorSetup:
+    """Of a vehicle with these sensors."""
+    return NavigatorSetup(
+        vehicle="auv", settings=SonarSettings(match=False), parameters=None,
+        actuation=library.vehicle("remus100").actuation, period=0.5, rates={}, usbl=UsblSettings(), sensors=SENSORS,
+        dock=None,
+    )  # fmt: skip
+
+
 @pytest.fixture(scope="module")
 def navigator() -> Any:
-    return registry.build(
-        NavigatorSetup(
-            vehicle="auv", settings=SonarSettings(match=False), parameters=None,
-            actuation=library.vehicle("remus100").actuation, period=0.5, rates={}, usbl=UsblSettings(), sensors=SENSORS,
-            dock=None,
-        )
-    )  # fmt: skip
+    return registry.build(setup())
+
+
+def test_a_navigator_and_its_frames_go_with_the_run() -> None:
+    """Nothing of it refers back to it: half a gigabyte of frames would wait for the garbage collector."""
+    made: Any = registry.build(setup())
+    made.update(0.5, [compass(0.5)], (), NONE)
+    parts = [weakref.ref(part) for part in (made, made._estimator, made._estimator.filter)]
+    gc.disable()
+    try:
+        del made
+        assert [part() for part in parts] == [None] * 3
+    finally:
+        gc.enable()
 
 
 def compass(time: float, heading: float = 0.4) -> Reading:
@@ -95,6 +113,13 @@ def test_a_mean_of_readings_weighs_by_their_number(navigator: Any) -> None:
     H = np.zeros(len(navigator.states))
     H[2] = H[k] = 1.0  # what the compass shows
     assert math.sqrt(H @ estimate.covariance @ H) == pytest.approx(math.radians(2.0) / math.sqrt(5.0), rel=0.2)
+
+
+def test_an_estimate_holds_no_more_than_itself(navigator: Any) -> None:
+    """A log that keeps it would else keep the covariance of all frames' poses with it, megabytes a tick."""
+    estimate = located(navigator, 2)
+    for part in (estimate.covariance, estimate.mean):
+        assert part.base is None
 
 
 def test_a_water_track_is_no_refused_measurement(navigator: Any) -> None:

@@ -3,18 +3,28 @@
 import math
 from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from scipy import stats
 from surroundings import Around
 
 from auvsim.base.frames import euler_to_quaternion
+from auvsim.physics import rays
 from auvsim.physics.truth import Truth
+from auvsim.sensors import sonar_array
 from auvsim.sensors.imaging_sonar import ImagingSonar, ImagingSonarSettings, absorption
 from auvsim.water.terrain import FlatFloor
 from auvsim.water.terrain_grid import Corner, GriddedFloor
 
-WIDE = {"elevation_deg": 90.0, "depression_deg": 20.0, "ghost": 0.0, "snr": 200.0, "speckle": False, "gain": 0.0}
+WIDE: dict[str, Any] = {
+    "elevation_deg": 90.0,
+    "depression_deg": 20.0,
+    "ghost": 0.0,
+    "snr": 200.0,
+    "speckle": False,
+    "gain": 0.0,
+}
 
 
 def at(north: float, east: float, depth: float, heading: float = 0.0, pitch: float = 0.0) -> Truth:
@@ -57,18 +67,90 @@ def test_level_floor_by_lambert() -> None:
     assert not mean[R < 4.5].any()
 
 
-def test_shadow_behind_a_wall() -> None:
-    """A wall 2 m high at 10 m from 5 m above the floor hides it until 10 * 5 / 3 m, and echoes in its own range."""
-    world = floor(lambda n, e: np.where((n >= 10.0) & (n < 10.3), 2.0, 0.0))
-    one = sonar(**WIDE, bins=300, maximum_range=30.0, beams=65)
-    mean = one.mean(at(0.0, 0.0, 15.0), world)[32]
-    end = math.hypot(10.3 * 5.0 / 3.0, 5.0)  # behind its far upper edge
-    wall = math.hypot(10.0, 3.0), math.hypot(10.0, 5.0)
-    hidden = (one.ranges > wall[1] + 0.3) & (one.ranges < end - 0.3)
-    assert mean[hidden].max() < 1e-3 * mean[one.ranges > end + 0.3].max()
-    assert mean[(one.ranges > end + 0.2) & (one.ranges < end + 1.0)].min() > 0.0
-    bright = float(one.ranges[np.argmax(mean * one.ranges**3 * (one.ranges > 9.5))])
-    assert wall[0] - one.width < bright < wall[1] + one.width
+def test_range_and_shadow_of_a_wall_to_a_bin() -> None:
+    """A wall 2 m high at 10 m from 5 m above the floor: where it begins, where it ends, and what it hides."""
+    n, e = np.arange(-2.0, 40.0, 0.05), np.arange(-20.0, 20.0, 0.05)
+    on = ((n > 9.98) & (n < 10.28))[:, None] * np.ones(len(e), dtype=bool)
+    world = Around(
+        terrain=GriddedFloor(Corner(-2.0, -20.0, 0.05, 0.05), 20.0 - 2.0 * on, np.where(on, 1e3, 1.0).astype("f4"))
+    )
+    one = sonar(**WIDE, bins=290, maximum_range=30.0, beams=65)
+    bare = one.mean(at(0.0, 0.0, 15.0), Around(terrain=FlatFloor(20.0)))[32].copy()
+    beam = one.mean(at(0.0, 0.0, 15.0), world)[32]
+    bright = one.ranges[beam > 5.0 * bare]
+    assert bright[0] == pytest.approx(math.hypot(10.0, 3.0), abs=one.width)  # its upper edge
+    assert bright[-1] == pytest.approx(math.hypot(9.975, 5.0), abs=one.width)  # its foot
+    dark = one.ranges[(beam < 0.01 * bare) & (one.ranges > 10.0)]
+    assert dark[0] == pytest.approx(math.hypot(9.975, 5.0), abs=1.5 * one.width)  # the bin after that of the foot
+    assert dark[-1] == pytest.approx(math.hypot(10.275 * 5.0 / 3.0, 5.0), abs=one.width)
+    assert len(dark) * one.width == pytest.approx(dark[-1] - dark[0] + one.width)  # nothing between
+
+
+class Drawn(Around):
+    """A world with what an MJCF text has, met by MuJoCo's rays."""
+
+    def holding(self, geoms: str) -> "Drawn":
+        """The same with geoms that are drawn as structures are."""
+        model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{geoms}</worldbody></mujoco>")
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        object.__setattr__(self, "_scene", (model, data))
+        return self
+
+    def rays(self, place: Any, directions: Any, reach: float) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """As of the world."""
+        return rays.cast(*self._scene, place, directions, reach)  # pyright: ignore
+
+
+def test_range_and_shadow_of_a_sphere_on_the_floor_to_a_bin() -> None:
+    """By rays against MuJoCo's geom, off the bow: its nearest side, the shadow between two tangents."""
+    radius, distance, bearing, height = 0.7, 10.0, -0.3, 5.0
+    n, e = 1.0 + distance * math.cos(0.8 + bearing), 2.0 + distance * math.sin(0.8 + bearing)
+    ball = f'<geom type="sphere" group="1" size="{radius}" pos="{n} {-e} {radius - 20.0}"/>'
+    world = Drawn(terrain=FlatFloor(20.0)).holding(ball)
+    one = sonar(**WIDE, bins=240, maximum_range=25.0, beams=121, beam_width_deg=1.0)
+    place = at(1.0, 2.0, 20.0 - height, heading=0.8)
+    bare = one.mean(place, Around(terrain=FlatFloor(20.0))).copy()
+    mean = one.mean(place, world).copy()
+    beam = int(np.argmin(np.abs(one.bearings - bearing)))
+    middle, down = math.hypot(distance, height - radius), math.atan2(height - radius, distance)
+    shown = one.ranges[mean[beam] > 1.2 * bare[beam]]
+    assert shown[0] == pytest.approx(middle - radius, abs=one.width)
+    dark = one.ranges[(mean[beam] < 0.5 * bare[beam])]
+    over = height / math.sin(down - math.asin(radius / middle))
+    under = height / math.sin(down + math.asin(radius / middle))  # the tangent below it ends before its foot
+    assert dark[0] == pytest.approx(under, abs=one.width)
+    assert dark[-1] == pytest.approx(over, abs=one.width)
+    assert len(dark) * one.width == pytest.approx(dark[-1] - dark[0] + one.width)
+    aside = np.abs(one.bearings - bearing) > math.asin(radius / distance) + math.radians(6.0)
+    np.testing.assert_array_equal(mean[aside], bare[aside])
+
+
+def test_a_wall_by_rays_hides_what_is_behind_it() -> None:
+    """A box from the floor up to the sonar's depth: one range, no floor behind it, and no ball behind it either."""
+    wall = '<geom type="box" group="1" size="0.1 6 2.6" pos="9.1 0 -17.5"/>'
+    ball = '<geom type="sphere" group="1" size="0.5" pos="14 0 -17"/>'
+    one = sonar(**WIDE, bins=240, maximum_range=25.0, beams=61)
+    place = at(0.0, 0.0, 15.0)
+    mean = one.mean(place, Drawn(terrain=FlatFloor(20.0)).holding(wall)).copy()
+    both = one.mean(place, Drawn(terrain=FlatFloor(20.0)).holding(wall + ball))
+    np.testing.assert_array_equal(both, mean)
+    heard = one.ranges[mean[30] > 1e-3 * mean[30].max()]
+    assert one.ranges[np.argmax(mean[30])] == pytest.approx(9.0, abs=one.width)
+    assert heard[-1] == pytest.approx(math.hypot(9.0, 5.0), abs=2.0 * one.width)  # the floor at its foot
+
+
+def test_a_hill_hides_what_is_behind_it() -> None:
+    """Of a pole behind a ridge only what stands above the line over the ridge is seen, and nothing of a low one."""
+    world = Drawn(terrain=floor(lambda n, e: np.where((n >= 8.0) & (n < 9.0), 2.5, 0.0)).terrain)
+    one = sonar(**WIDE, bins=240, maximum_range=25.0, beams=61)
+    echoes = []
+    for top in (1.0, 5.0):  # of a pole at 14 m; over the ridge's far edge, 2.5 m below, the line is 3.9 m down there
+        pole = f'<geom type="box" group="1" size="0.2 0.2 {top / 2}" pos="14.2 0 {-20.0 + top / 2}"/>'
+        mean = one.mean(at(0.0, 0.0, 15.0), world.holding(pole))[30]
+        echoes.append(mean[np.abs(one.ranges - 14.3) < 0.5].sum())
+    assert echoes[0] == 0.0
+    assert echoes[1] > 0.0
 
 
 @pytest.mark.parametrize("heading", [0.0, 2.0])
@@ -148,6 +230,20 @@ def test_second_path_by_the_surface() -> None:
     assert ghost.sum() == pytest.approx(0.1 * direct.sum(), rel=0.35)
 
 
+def test_an_object_has_a_second_path_too() -> None:
+    """A ball in mid water, far above the floor: a tenth of its echo comes again by half the way by the surface."""
+    world = Drawn(terrain=FlatFloor(500.0)).holding('<geom type="sphere" group="1" size="0.3" pos="9 0 -7"/>')
+    place = at(0.0, 0.0, 4.0)
+    found = [
+        sonar(**WIDE | {"ghost": g}, bins=200, maximum_range=25.0, beams=61).mean(place, world) for g in (0.0, 0.1)
+    ]
+    direct, ghost = found[0][30], (found[1] - found[0])[30]
+    assert ghost.sum() == pytest.approx(0.1 * direct.sum(), rel=1e-6)
+    R = sonar(**WIDE, bins=200, maximum_range=25.0, beams=61).ranges
+    near, far = (math.hypot(9.0, z) - 0.3 for z in (3.0, 11.0))
+    assert R[np.flatnonzero(ghost)[0]] == pytest.approx(0.5 * (near + far), abs=0.3)  # other points of the ball
+
+
 def test_speckle_is_exponential_and_new_in_each_frame() -> None:
     """Intensity by its mean follows the exponential law (Kolmogorov-Smirnov), and two pings are independent."""
     one = sonar(5, beams=128, bins=200, snr=10.0)
@@ -181,3 +277,59 @@ def test_what_no_instrument_has_is_refused(key: str, value: float) -> None:
 def test_absorption_at_100_kilohertz() -> None:
     """Sea water of 10 degrees takes some 35 dB of a kilometre (Francois and Garrison 1982, fig. 5: 34)."""
     assert 10.0 / math.log(10.0) * 1000.0 * absorption(100.0) == pytest.approx(34.0, abs=2.0)
+
+
+def test_beams_of_an_array_are_as_wide_as_its_elements_make_them() -> None:
+    """Half power 1.44 lengths' inverse off a lone echo, 1 / cos(bearing) wider off the axis; nothing is lost."""
+    one = sonar(beams=801, elements=48, **WIDE)
+    assert one._response is not None
+    power = one._response**2
+    np.testing.assert_allclose(power.sum(axis=1), 1.0)
+    for bearing in (0.0, -0.7):
+        beam = power[int(np.argmin(np.abs(one.bearings - bearing)))]
+        half = one.bearings[beam > 0.5 * beam.max()]
+        width = sonar_array.beam_width(48) / math.cos(bearing)
+        assert half[-1] - half[0] == pytest.approx(width, abs=2.5 * float(one.bearings[1] - one.bearings[0]))
+
+
+def test_neighbouring_beams_of_an_array_share_speckle() -> None:
+    """Each sample is exponential; of two beams, correlation is the square of their patterns' product (300 pings)."""
+    one = sonar(7, beams=61, elements=16, snr=40.0, bins=60)
+    world, place = Around(terrain=FlatFloor(20.0)), at(0.0, 0.0, 15.0)
+    gain = one.ranges**3.0 * np.exp(2.0 * one.absorption * one.ranges)
+    expected = (one.mean(place, world) + one.noise) * gain
+    frames = np.array([one.image(place, world) for _ in range(300)]) / expected
+    near, far = frames[:, 30, 30:], frames[:, 33, 30:]
+    assert stats.kstest(near.ravel(), "expon").pvalue > 0.01
+    assert one._response is not None
+    inner = float(one._response[30] @ one._response[33])
+    found = np.mean([np.corrcoef(near[:, k], far[:, k])[0, 1] for k in range(30)])
+    assert 0.3 < inner**2 < 0.9
+    assert found == pytest.approx(inner**2, abs=4.0 / math.sqrt(300 * 30))
+
+
+def test_an_array_needs_beams_that_overlap() -> None:
+    """128 elements make beams of 1.3 deg; 64 beams over 120 deg stand 1.9 deg apart."""
+    with pytest.raises(ValueError, match=r"beams: 128 elements make beams of 1\.3 deg.* give 188 beams or more"):
+        ImagingSonarSettings(elements=128, beams=64)
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"maximum_range": 130.0}, "maximum_range: 130 m; oculus_m750d has 120 m or less"),
+        ({"maximum_range": 5.0, "bins": 1200}, "bins: 0.00333333 m wide; oculus_m750d has 0.004 m or more"),
+    ],
+)
+def test_what_an_instrument_cannot_do_is_refused(change: dict, says: str) -> None:
+    """Beyond the range and the resolution of its data sheet."""
+    with pytest.raises(ValueError, match=says):
+        ImagingSonarSettings(preset="oculus_m750d", **change)
+
+
+@pytest.mark.parametrize(("preset", "apart"), [("oculus_m750d", 0.25), ("blueview_m900", 0.18)])
+def test_presets_are_those_of_the_data_sheets(preset: Any, apart: float) -> None:
+    """Beams stand as far apart as the data sheet says, to the 6 % by which its own numbers contradict each other."""
+    one = sonar(preset=preset)
+    assert math.degrees(one.bearings[-1] - one.bearings[0]) == pytest.approx(130.0)
+    assert math.degrees(one.bearings[1] - one.bearings[0]) == pytest.approx(apart, rel=0.06)

@@ -4,10 +4,16 @@ import math
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from auvsim.base.errors import InputError
+from auvsim.physics.scenery import MOST_POINTS
+from auvsim.physics.scenes import WorldSettings, scene
+from auvsim.physics.world import World
 from auvsim.water import seabed
+from auvsim.water.currents import Uniform
 from auvsim.water.seabed import PipelineSettings, SeabedSettings
+from auvsim.water.terrain_grid import GriddedFloor
 
 
 def test_variance_and_spectrum_of_the_fractal() -> None:
@@ -49,6 +55,60 @@ def test_pipeline_and_ripples() -> None:
     rippled = seabed.make(SeabedSettings(**flat, ripple_height=0.2, ripple_length=2.0, ripple_direction_deg=90.0), 20.0)
     assert np.ptp(rippled.depths) == pytest.approx(0.2, rel=1e-3)
     np.testing.assert_allclose(rippled.depths[0], rippled.depths[-1])
+
+
+def test_debris_lies_on_the_floor_as_boxes() -> None:
+    """As many as asked for (Poisson), of their length and a third of it; the floor below stays, and so do rocks."""
+    settings = {"extent": 200.0, "spacing": 0.1, "roughness": 0.0, "rocks": 0.0}
+    bare = seabed.make(SeabedSettings(**settings), 20.0)
+    assert np.ptp(bare.depths) == 0.0
+    floor = seabed.make(SeabedSettings(**settings, debris=0.01, debris_length=1.2), 20.0)
+    boxes, count = ndimage.label(floor.strength == seabed.DEBRIS_ECHO)
+    # 400 boxes, sd 20; of them some 400^2 / 2 * 2 m2 / 40000 m2 = 4 pairs touch.
+    assert count == pytest.approx(396, abs=4 * 20)
+    areas = np.bincount(boxes.ravel())[1:] * 0.01
+    # Of a log-normal length, the mean of its square: 1.2^2 exp(2 * 0.4^2) / 3, sd of a mean of 400 some 4 %.
+    assert areas.mean() == pytest.approx(1.2**2 * math.exp(2.0 * 0.4**2) / 3.0, rel=0.16)
+    single = max(range(1, count + 1), key=lambda k: -abs(areas[k - 1] - np.median(areas)))
+    n, e = np.nonzero(boxes == single)
+    spread = np.sqrt(np.linalg.eigvalsh(np.cov(0.1 * np.array([n, e]))) * 12.0)  # sides of an even box
+    assert spread[1] / spread[0] == pytest.approx(3.0, rel=0.3)
+    assert 20.0 - floor.depths[n[0], e[0]] == pytest.approx(0.25 * spread[1], rel=0.15)
+    assert (floor.depths[floor.strength == 1.0] == 20.0).all()
+    rough = {"extent": 60.0, "rocks": 0.05}
+    one, other = (seabed.make(SeabedSettings(**rough, debris=density), 20.0) for density in (0.0, 0.02))
+    same = other.strength != seabed.DEBRIS_ECHO
+    np.testing.assert_array_equal(one.depths[same], other.depths[same])
+
+
+def test_a_vehicle_that_sinks_touches_the_floor_that_the_sonar_sees() -> None:
+    """Pushed down over roughness and ripples: contacts are where the fine floor is, to what coarse cells miss."""
+    made = SeabedSettings(
+        extent=200.0, spacing=0.2, roughness=0.5, rocks=0.0, longest=30.0, ripple_height=0.3, ripple_length=8.0, seed=4
+    )
+    settings = WorldSettings(terrain=made, sea_floor=20.0)
+    floor = settings.floor
+    assert isinstance(floor, GriddedFloor)
+    coarse = floor.coarse(MOST_POINTS)
+    assert coarse.depths.shape[0] < floor.depths.shape[0] / 3
+    world = World(scene({"auv": "remus100"}, {}, settings, 100.0), Uniform((0.0, 0.0, 0.0)), settings.water_density)
+    for north, east, heading in ((13.0, -22.0, 0.4), (-51.0, 40.0, 2.0)):
+        world.reset()
+        world.place("auv", np.array([north, east, floor.depth(north, east) - 1.2]), heading, 0.0, [0.0] * 5)
+        body = world.model.body("auv/hull").id
+        while not world.contacts("auv"):
+            world.data.xfrc_applied[body, 2] = -30.0
+            world.advance(1)
+            assert world.time < 20.0
+        assert {contact.other for contact in world.contacts("auv")} == {"sea_floor"}
+        assert len(world.data.contact.pos)
+        for point in world.data.contact.pos:
+            n, e, down = point[0], -point[1], -point[2]
+            places = [(n + a, e + b) for a in np.arange(-0.8, 0.9, 0.2) for b in np.arange(-0.8, 0.9, 0.2)]
+            missed = max(abs(floor.depth(*place) - coarse.depth(*place)) for place in places)
+            assert missed < 0.2
+            # Besides: a cell's two triangles for the bilinear surface, and how far a contact goes in within a step.
+            assert down == pytest.approx(floor.depth(n, e), abs=missed + 0.02)
 
 
 def test_coarse_floor_lies_on_the_fine_one() -> None:
