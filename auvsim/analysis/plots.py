@@ -237,8 +237,8 @@ def _consistency(quality: EstimateQuality) -> str:
 def _error(axes: Axes, errors: EstimateErrors, error: Array, sigma: Array, free: NDArray[np.bool_]) -> None:
     seen = errors.initialised & np.isfinite(error)
     time, band = errors.time[seen], 2.0 * sigma[seen]
-    jumps = np.abs(np.diff(band)) if len(band) > 1 else np.zeros(1)
-    edge = 0.9 if np.percentile(jumps, 90.0) < 0.05 * np.median(band) else 0.0  # else the band would be all edge
+    jumps = np.abs(np.diff(band))  # where most are large, the band would be all edge
+    edge = 0.9 if len(band) < 2 or np.percentile(jumps, 90.0) < 0.05 * np.median(band) else 0.0
     axes.fill_between(time, -band, band, facecolor=BAND, edgecolor=BAND_EDGE, lw=edge)
     axes.plot(time, error[seen], color="#1a1a1a", lw=1.1)
     axes.axhline(0.0, color="#888888", lw=0.7)

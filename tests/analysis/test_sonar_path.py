@@ -10,6 +10,7 @@ import pytest
 from synthetic import trial_log
 
 from auvsim.analysis import sonar_map, sonar_path, sonar_plots
+from auvsim.analysis.summary import summarise
 from auvsim.base.frames import Array
 from auvsim.data.log import VehicleLog
 from auvsim.data.phases import interpolate
@@ -78,6 +79,16 @@ def test_a_turned_path_has_no_error_left(log: VehicleLog) -> None:
     raw = sonar_path.path_errors(log, path)
     assert np.hypot(*raw[:, :2].T).max() > 3.0  # a chord of the turn on top of where the dive was believed
     np.testing.assert_allclose(raw[:, 2], ANGLE, atol=1e-9)
+
+
+def test_the_summary_tells_closures_and_the_turned_error(log: VehicleLog) -> None:
+    """A log of another estimator has neither."""
+    values = summarise(log)
+    assert values["loop_closures"] == log["matching"]["closures"][-1]
+    found = sonar_path.turned_errors(log)
+    assert found is not None
+    assert values["turned_rms"] == found.rms
+    assert not {"loop_closures", "turned_rms"} & summarise(trial_log()).keys()
 
 
 def test_the_rotation_is_the_best_one() -> None:

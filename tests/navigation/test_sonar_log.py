@@ -1,14 +1,19 @@
 """What the log holds of a sonar's navigation: which loop closures were believed, and the keyframes' path."""
 
 import math
+from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+import pytest
 
+from auvsim.data.log import read
 from auvsim.navigation import sonar_log
 from auvsim.navigation.sonar import WINDOW
 from auvsim.navigation.sonar_log import PATH, SHADES, TABLES, SonarLog, believed
+from auvsim.simulation.loading import load_scenario
+from auvsim.simulation.run import run
 from estimators.core.types import Gaussian
 from estimators.map_path.frames import SectorGrid
 from estimators.map_path.keyframes import MARKED, Closure, KeyframeState
@@ -84,3 +89,23 @@ def test_the_path_is_that_of_the_state() -> None:
         assert [row[n] for n in names[-5:]] == [0.3, 0.4, 1.4, 0.9, 1.1]
     assert log.groups[PATH].shape(2, "image") == (2, 5, 8)
     assert SonarLog(navigator(None)).path() == []
+
+
+@pytest.mark.slow
+def test_a_survey_logs_its_path_and_closures(tmp_path: Path) -> None:
+    """Until the second lane one way has closed loops: every closure has a row, and the path is near the estimates."""
+    found = run(load_scenario("survey", duration=430.0), seed=3, path=tmp_path / "trial.nc")
+    log = read(tmp_path / "trial.nc").vehicle()
+    assert log.log.attributes["status"] == found.attributes["status"]
+    rows, path, counts = log[sonar_log.CLOSURES], log[PATH], log[sonar_log.MATCHING]["closures"]
+    assert counts[-1] >= 3
+    assert len(np.unique(np.column_stack((rows["time"], rows["later"])), axis=0)) == counts[-1]
+    known = np.isfinite(rows["earlier"])
+    assert known.sum() >= 2
+    assert (rows["later"][known] - rows["earlier"][known] > 60.0).all()  # of another lane
+    assert np.isin(rows["earlier"][known], path["time"][path["frame"]]).all()
+    assert path["frame"].tolist() == [False] + [True] * (len(path["time"]) - 1)
+    estimate = log["estimate"]
+    then = np.column_stack([np.interp(path["time"], estimate["time"], estimate["position"][:, k]) for k in range(2)])
+    assert np.abs(path["pose"][:, :2] - then).max() < 4.0  # what is learnt later of the fixes' slow error
+    assert np.linalg.eigvalsh(path["covariance"]).min() > 0.0
