@@ -23,10 +23,12 @@
 import numpy as np
 from matplotlib import pyplot as plt
 
-from auvsim.analysis import bound_maps
+from auvsim.analysis import bound_maps, floor_bound_files
+from auvsim.analysis.floor_bound import floor_bound
 from auvsim.analysis.sonar_map import map_figure
 from auvsim.reproduce.paper5.methods import METHODS, TITLES, frame_model
 from auvsim.reproduce.paper5.scenes import GRID, Conditions, arc, simulate
+from auvsim.simulation.loading import load_scenario
 from estimators.map_path.bound_map import height_information, match_bound
 from estimators.map_path.likelihood import Matcher
 
@@ -96,4 +98,16 @@ chart = bound_maps.BoundMap(north=north[::4], east=east[::4], bound=bound[::4, :
 bound_maps.draw(axes, chart, title="Where matching will hold", quantity="least deviation of one match, worst axis [m]")
 
 # %% [markdown]
-# `auvsim run survey --seed 1` is a mission with all of it: a GPS fix, a dive, lanes over a generated floor, home to the dock by DVL and sonar.
+# The same of a mission's own floor and sonar, with its lanes: relief and rocks against speckle and noise, from the altitude of the survey. The shell's form is
+# `auvsim floor survey`, or `auvsim floor depths.nc` of a grid of your own.
+
+# %%
+found = floor_bound(load_scenario("survey", water={"terrain": {"rocks": 0.01, "roughness": 0.15}}))
+print(
+    f"one match to 0.1 m on {(found.bound <= 0.1).mean():.0%} of the floor, {(found.along <= 0.1).mean():.0%} of the lanes"
+)
+floor_bound_files.figure(found, holds=0.1)
+
+# %% [markdown]
+# `auvsim run survey --seed 1` is a mission with all of it: a GPS fix, a dive, lanes over a generated floor, home to the dock by DVL and sonar. It leaves the errors (`sonar.png`), the
+# feature map as a picture and, with the pose, attitude and covariance of each keyframe, as data (`feature_map.png`, `feature_map.nc`), and a video.

@@ -9,6 +9,7 @@ import numpy as np
 from auvsim.analysis.bad_frames import bad_frames
 from auvsim.analysis.estimates import estimate_errors, estimate_quality
 from auvsim.analysis.heard import heard_vehicles, relative_to
+from auvsim.analysis.sonar_path import turned_errors
 from auvsim.base import plugins
 from auvsim.base.errors import InputError
 from auvsim.base.frames import Array
@@ -40,6 +41,12 @@ def summarise(log: VehicleLog) -> dict[str, Any]:
             "fixes_sent": len(usbl["time"]),
             "fixes_lost": int(usbl["lost"].sum()),
             "fixes_outliers": int((usbl["outlier"] & ~usbl["lost"]).sum()),
+        }
+    if "matching" in log:
+        turned = turned_errors(log)
+        values |= {
+            "loop_closures": int(log["matching"]["closures"].max(initial=0)),
+            "turned_rms": None if turned is None else turned.rms,
         }
     values["fixes_refused"] = int(log["estimate"]["refused"].max(initial=0))
     if bad := bad_frames(log):

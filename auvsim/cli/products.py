@@ -11,7 +11,7 @@ from auvsim.data.log import Log, read
 
 NO_OPENGL = "no video: OpenGL is missing; apt-get install libegl1 libgl1, then `auvsim video {log}` makes it"
 VIDEOS = ("docking.mp4", "run.mp4")  # of a docking by one vehicle, and of anything else
-MAP = "feature_map.png"
+MAP, MAP_DATA, SONAR = "feature_map.png", "feature_map.nc", "sonar.png"  # of a vehicle that navigates by a sonar
 
 
 def is_manoeuvre(log: Log) -> bool:
@@ -22,7 +22,8 @@ def is_manoeuvre(log: Log) -> bool:
 def plots(log: Log, folder: Path) -> None:
     """Draws track.png and estimates.png; of a manoeuvre one picture of its name, of several vehicles fleet.png.
 
-    Where vehicles have modems also packets.png, and where some are in formation formation.png.
+    Where vehicles have modems also packets.png, where some are in formation formation.png, and of one that navigates by
+    a sonar sonar.png, feature_map.png and feature_map.nc.
     """
     from auvsim.analysis import fleet_plots, formation_plots, manoeuvre_plots, network_plots, plots
     from auvsim.missions.manoeuvres import laws
@@ -46,19 +47,22 @@ def plots(log: Log, folder: Path) -> None:
     for draw, name in ((plots.track, "track.png"), (plots.estimates, "estimates.png")):
         with whole(folder / name) as partial:
             draw(log.vehicle(), partial)
+    sonar(log, folder)
 
 
-def sonar_map(simulation: Any, folder: Path) -> None:
-    """Draws feature_map.png of a lone vehicle that navigates by a sonar; nothing of others."""
-    from auvsim.analysis import sonar_map
-    from auvsim.navigation.sonar import SonarNavigator
+def sonar(log: Log, folder: Path) -> None:
+    """Draws sonar.png and feature_map.png and writes feature_map.nc, if a lone vehicle kept frames of a sonar."""
+    from auvsim.analysis import sonar_map, sonar_path, sonar_plots
 
-    navigators = [agent.navigator for agent in simulation.agents]
-    if len(navigators) == 1 and isinstance(navigators[0], SonarNavigator):
-        _, poses, images = navigators[0].path
-        if len(poses):
-            with whole(folder / MAP) as partial:
-                sonar_map.sonar_map(images, poses, navigators[0].grid, partial)
+    vehicle = log.vehicle()
+    path = sonar_path.sonar_path(vehicle)
+    if path is None:
+        return
+    with whole(folder / SONAR) as partial:
+        sonar_plots.navigation(vehicle, path, partial)
+    with whole(folder / MAP) as partial:
+        sonar_map.sonar_map(vehicle, path, partial)
+    sonar_map.save_map(vehicle, path, folder / MAP_DATA)
 
 
 def video_name(log: Log) -> str:

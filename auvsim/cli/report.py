@@ -175,6 +175,10 @@ ROWS = {  # key of a summary: what the table calls it; those that a vehicle's su
     "contacts": "contacts",
     "shaft_energy": "shaft energy [J]",
     "way": "way through the water [m]",
+    "lanes_done": "all lanes done",
+    "least_altitude": "least altitude on the lanes [m]",
+    "loop_closures": "loop closures believed",
+    "turned_rms": "position rms over the lanes, turned about the dive point [m]",
     "fixes_sent": "fixes sent",
     "fixes_lost": "fixes lost",
     "fixes_refused": "fixes refused",
@@ -265,4 +269,6 @@ def _text(value: Any) -> str:
         return "-"
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return f"{value:.3g}" if isinstance(value, float) else str(value)
+    if isinstance(value, float):
+        return f"{value:.3g}" if abs(value) < 999.5 or not math.isfinite(value) else f"{value:.0f}"
+    return str(value)

@@ -1,11 +1,10 @@
 """`auvsim run` and `auvsim dock`: checks everything, runs a scenario, leaves whole files."""
 
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryFile
-from typing import Any
 
 from auvsim.base.errors import InputError
 from auvsim.cli import products, report
@@ -13,7 +12,16 @@ from auvsim.data.log import Log
 from auvsim.simulation.scenario import Scenario
 
 LOG = "trial.nc"
-PRODUCTS = ("summary.json", "track.png", "estimates.png", "fleet.png", products.MAP, *products.VIDEOS)  # made from it
+PRODUCTS = (
+    "summary.json",
+    "track.png",
+    "estimates.png",
+    "fleet.png",
+    products.MAP,
+    products.MAP_DATA,
+    products.SONAR,
+    *products.VIDEOS,
+)  # made from it
 COMPILING = "compiling {} (this once; later runs find the code in the cache)"
 WARM_UP = 30.0  # simulated time in which a first fix has arrived [s]
 
@@ -22,8 +30,7 @@ def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, na
     """Runs the scenario, fills the folder and returns the exit code."""
     path = out / LOG
     with output_folder(out):
-        ended: list[Any] = []
-        log = simulate(scenario, seed, trial, name, path, ended.append)
+        log = simulate(scenario, seed, trial, name, path)
         for product in PRODUCTS:  # what an earlier run left would not belong to this log
             (out / product).unlink(missing_ok=True)
     status = log.attributes["status"]
@@ -36,8 +43,6 @@ def run(scenario: Scenario, *, seed: int, trial: int, out: Path, video: bool, na
             print(f"auvsim: {diagnosis(log)}; {path} holds the run up to there", file=sys.stderr)
             return 1
         products.plots(log, out)
-        for simulation in ended:
-            products.sonar_map(simulation, out)
         if video:
             _video(log, out)
     except OSError as error:
@@ -86,18 +91,8 @@ def _is_file(path: Path) -> bool:
         return False
 
 
-def simulate(
-    scenario: Scenario,
-    seed: int,
-    trial: int,
-    name: str,
-    path: Path,
-    finished: Callable[[Any], None] | None = None,
-) -> Log:
-    """Runs a scenario into a file, with a progress bar of that name; says so if it has to compile first.
-
-    `finished` is called with the simulation after its last step.
-    """
+def simulate(scenario: Scenario, seed: int, trial: int, name: str, path: Path) -> Log:
+    """Runs a scenario into a file, with a progress bar of that name; says so if it has to compile first."""
     from auvsim.physics import fluid
     from auvsim.simulation.run import run as run_scenario
 
@@ -108,7 +103,7 @@ def simulate(
             if run_scenario(short, seed=seed, trial=trial).attributes["status"] == "interrupted":
                 raise KeyboardInterrupt
     with report.TrialProgress(name) as progress:
-        return run_scenario(scenario, seed=seed, trial=trial, progress=progress, path=path, finished=finished)
+        return run_scenario(scenario, seed=seed, trial=trial, progress=progress, path=path)
 
 
 def _video(log: Log, out: Path) -> None:

@@ -173,7 +173,7 @@ class ImagingSonar(Sensor):
         self._bins = np.array((self.ranges[0], self.width))
         self._beam = np.array((spacing, self._high))
         self._loss = np.exp(-2.0 * self.absorption * self.ranges) / self.ranges**4
-        self.noise = self._level_echo(0.5 * settings.maximum_range, 5.0) / 10.0 ** (0.1 * settings.snr)
+        self.noise = self.level_echo(0.5 * settings.maximum_range, 5.0) / 10.0 ** (0.1 * settings.snr)
         self._gain = (self.ranges ** (0.1 * settings.gain) * np.exp(2.0 * self.absorption * self.ranges)).astype(
             np.float32
         )
@@ -183,7 +183,7 @@ class ImagingSonar(Sensor):
             self.value, self.sizes = FRAME, {"beam": settings.beams, "bin": settings.bins}
         self.reference = float(self.noise * np.median(self._gain))  # intensity of level 0
 
-    def _level_echo(self, distance: float, height: float) -> float:
+    def level_echo(self, distance: float, height: float) -> float:
         """Intensity in a bin of level sand at a range [m], in the beam's axis, before the gain."""
         ground = math.sqrt(max(distance**2 - height**2, 1e-6))
         along = self.width * distance / ground

@@ -23,6 +23,7 @@ from auvsim.navigation.gate import Gate
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.message_gate import MessageGate
 from auvsim.navigation.navigator import Navigator
+from auvsim.navigation.sonar_log import sonar_log
 from auvsim.navigation.state_report import state_report
 from auvsim.physics.propulsion import propulsion
 from auvsim.physics.truth import Truth
@@ -113,6 +114,7 @@ class Agent:
         )
         setup = navigator_setup(plan, name, vehicle)
         self.navigator = navigator or estimators.build(setup)
+        self._sonar_log = sonar_log(self.navigator)
         self.messages = MessageGate(name, setup.others) if setup.modem else None  # the gate for them
         self.controller = controllers.build(
             settings.control.kind,
@@ -175,7 +177,7 @@ class Agent:
         actuation = self.vehicle.actuation
         of_sensors = {s.name: ({"value": s.value}, s.sizes) for s, _, _ in self.sensors}
         of_sensors |= {"usbl": usbl} if usbl else {}
-        return vehicle_groups(
+        groups = vehicle_groups(
             sensors=of_sensors,
             mission=(self.mission.phases, self.mission.variables),
             demands={d.name: Variable((), "float64", d.units, d.long_name) for d in actuation.demands},
@@ -183,6 +185,7 @@ class Agent:
             states=self.navigator.states,
             modem=self.messages is not None,
         )
+        return groups | (self._sonar_log.groups if self._sonar_log else {})
 
     def sense(self, ticks: int, truth: Truth, world: Surroundings, log: Log) -> None:
         """Takes the readings that are due at a control tick."""
@@ -271,6 +274,13 @@ class Agent:
         for o in outcomes:
             row = (time, o.source or o.kind, o.stamp, o.sequence, o.accepted, o.reason, o.nis)
             log.append(self._measurements, row)
+        for group, values in self._sonar_log.rows(time) if self._sonar_log else ():
+            log.append(f"vehicles/{self.name}/{group}", values)
+
+    def log_path(self, log: Log) -> None:
+        """Logs the path given all that was measured, of an estimator that keeps it, when the run ends."""
+        for group, values in self._sonar_log.path() if self._sonar_log else ():
+            log.append(f"vehicles/{self.name}/{group}", values)
 
     def act(self, time: float, latched: str | None, log: Log) -> Any:
         """The demand on the actuators now, or None where nothing is measured yet: the vehicle goes on as it started."""

@@ -7,6 +7,7 @@ from auvsim.base.randomness import stream
 from auvsim.data.description import table_markdown
 from auvsim.data.variables import ESTIMATE, MISSION, Table, Variable
 from auvsim.missions.registry import MISSIONS
+from auvsim.navigation import sonar_log
 from auvsim.navigation.estimate import PLANAR_STATES
 from auvsim.sensors import registry
 from auvsim.vehicles import library
@@ -40,6 +41,7 @@ def shipped(model: str) -> dict[str, Table]:
         phase = replace(MISSION["phase"], flags=mission.phases)
         tables[f"Mission of kind `{kind}`"] = {"phase": phase, **mission.variables}
     tables["Estimators of the planar model"] = {"mean": mean}
+    tables |= {f"Group `{name}`, of a vehicle that navigates by a sonar": t for name, t in sonar_log.TABLES.items()}
     tables[f"Demands on `{model}`, in `command`"] = demands
     return tables
 

@@ -54,7 +54,6 @@ def run(
     progress: Callable[[ProgressState], None] | None = None,
     path: str | os.PathLike[str] | None = None,
     check_step: bool = True,
-    finished: "Callable[[Simulation], None] | None" = None,
 ) -> Log:
     """Runs a scenario and returns its log, also when it diverges or is interrupted.
 
@@ -65,7 +64,6 @@ def run(
         progress: called about ten times a simulated minute.
         path: file of the log, which grows during the run; None keeps the log in memory.
         check_step: whether a physics step that is too long is refused; else it runs, most likely until it diverges.
-        finished: called with the simulation after its last step, for what the log does not hold.
 
     Raises:
         InputError: a model, a part or a number of the scenario cannot be used.
@@ -96,8 +94,8 @@ def run(
             log.event(simulation.time, "", "interrupted", "stopped by the user")
         simulation.log_contacts()
         simulation.log_under_way()
-        if finished:
-            finished(simulation)
+        for agent in simulation.agents:
+            agent.log_path(log)
         return log.finish(status, wall_time=wall.perf_counter() - started)
 
 

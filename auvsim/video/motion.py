@@ -12,10 +12,12 @@ from auvsim.base.frames import Array, flip, flip_quaternion
 from auvsim.data.log import VehicleLog
 from auvsim.data.phases import phase_at
 from auvsim.missions.docking.dock_frame import nose_position
+from auvsim.missions.docking.guidance import Docking
 
 FARTHEST = 1e4  # a vehicle farther from the origin than this has diverged [m]
 # At 25 pictures a second a propeller of 25 revolutions a second would seem to stand still: it is shown slowed down.
 PROPELLER_SLOWNESS = 17.0
+LANES = "lanes"  # phase of a survey
 AT_END = ("docked", "aborted", "done")  # phases in which a mission has come to its end
 
 
@@ -44,7 +46,7 @@ class VehicleMoment:
     turns: Array  # (n,) their integrals, slowed down [rad s, rad]
     range: float  # from the nose to the centre of the mission's mouth [m]; NaN without one
     phase: int  # index into the mission's phases, -1 before the first
-    count: int | None  # attempt or waypoint, if the mission logs one
+    count: str  # number of the attempt or waypoint; empty where there is none
     belief: Belief | None  # before the first fix there is none
 
 
@@ -78,8 +80,8 @@ class Motion:
         self._truth_columns(slice(0, count))
         self._belief_columns()
         mission = log["mission"]
-        self.counted = next((name for name in ("attempt", "waypoint") if name in mission), "")
-        self._mission_times, self._counts = mission["time"], mission.get(self.counted)
+        self._mission_times = mission["time"]
+        self._counts = {name: mission[name] for name in ("attempt", "waypoint") if name in mission}
 
     def _truth_columns(self, part: slice) -> None:
         truth = self.log["truth"]
@@ -157,9 +159,20 @@ class Motion:
             turns=mix(self._turns),
             range=float(mix(self.ranges)),
             phase=int(self.log["mission"]["phase"][now]) if now >= 0 else -1,
-            count=None if self._counts is None else int(self._counts[max(now, 0)]) if len(self._counts) else 1,
+            count=self._count(now),
             belief=self._belief(time),
         )
+
+    def _count(self, now: int) -> str:
+        """What a sample of the mission counts; where there are lanes and a dock, waypoints there and attempts here."""
+        names = [*self._counts]
+        if len(names) > 1:
+            phase = self.phase_names[int(self.log["mission"]["phase"][now])] if now >= 0 else ""
+            names = ["attempt"] if phase in Docking.phases else ["waypoint"] if phase == LANES else []
+        if not names:
+            return ""
+        counts = self._counts[names[0]]
+        return f"{names[0]} {int(counts[max(now, 0)]) if len(counts) else 1}"
 
     def _belief(self, time: float) -> Belief | None:
         if not len(self.belief_times) or time < self.belief_times[0]:

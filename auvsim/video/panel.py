@@ -81,11 +81,11 @@ def _lone(on: Panel, motion: Motion, moment: Moment, speed: float) -> None:
     now = moment.followed
     on.block(16, 42, 230, 30, phase_colour(motion.phase_names, now.phase))
     on.put(_phase(motion, now), 26, 63, Style(19, WHITE, bold=True))
-    if now.count is not None:
-        on.put(f"{motion.counted} {now.count}", 262, 63, Style(17, WHITE))
+    if now.count:
+        on.put(now.count, 262, 63, Style(17, WHITE))
     numbers = [
         ("time", f"{moment.time:.1f} s"),
-        ("shown", _shown(speed)),
+        ("speed-up", _shown(speed)),
         ("depth", f"{-now.position[2]:.1f} m") if math.isnan(now.range) else ("nose to dock", _range(now)),
         ("over ground", f"{now.speed:.2f} m/s"),
         ("estimate off by", error(now)),
@@ -100,8 +100,8 @@ def _lone(on: Panel, motion: Motion, moment: Moment, speed: float) -> None:
 def _fleet(on: Panel, playback: Playback, moment: Moment, speed: float) -> None:
     """A row for each vehicle, in the colour of its track."""
     small = Style(12, GREY)
-    values = (("time", f"{moment.time:.1f} s"), ("shown", _shown(speed)), ("current", _current(moment.followed)))
-    for (name, value), x, indent in zip(values, (16, 150, 270), (36, 48, 54), strict=True):
+    values = (("time", f"{moment.time:.1f} s"), ("speed-up", _shown(speed)), ("current", _current(moment.followed)))
+    for (name, value), x, indent in zip(values, (16, 150, 270), (36, 64, 54), strict=True):
         on.put(name, x, 55, small)
         on.put(value, x + indent, 55, Style(15, WHITE, bold=True))
     for text, x in (("phase", 104), ("to dock" if playback.docks else "depth", 232), ("estimate off by", 308)):

@@ -37,13 +37,13 @@ class Stage:
         if len(cameras) > MOST:
             raise InputError(f"video: {len(cameras)} cameras: at most {MOST} fit into the picture")
         self._playback, self._views = playback, tuple(cameras)
-        frames = sonar.frames_of(playback)
-        self._sonar = sonar.SonarViews(frames, playback.first, playback.docks) if frames else None
-        self._beside = beside(playback) if frames is None else ("follow", "sonar")
+        self._sonar = sonar.SonarViews(playback)
+        self._far_view = sonar.MAP if sonar.MAP in self._sonar.views else "overview"
+        self._beside = ("follow", sonar.SONAR) if sonar.SONAR in self._sonar.views else beside(playback)
         self._boxes = layout(width, height, len(cameras) or 1 + len(self._beside))
         self._cameras = Cameras(playback, self._boxes[0].width / self._boxes[0].height)
         for name in cameras:
-            if name in sonar.VIEWS and frames is None:
+            if name in sonar.VIEWS and name not in self._sonar.views:
                 raise InputError(f"camera '{name}': the log holds no frames of a sonar; set its `log_frames`")
             if name not in sonar.VIEWS:
                 self._cameras.check(name)
@@ -74,8 +74,7 @@ class Stage:
         """
         moment = self._playback.at(frame.time, frame.focus)
         self._playback.pose_model(moment)
-        far = "map" if self._sonar else "overview"
-        views = self._views or ("dock" if frame.near else far, *self._beside)
+        views = self._views or ("dock" if frame.near else self._far_view, *self._beside)
         if "overview" in views:
             self._far.update(moment)
         drawn = ""  # vehicle round which the marks of the near views are
@@ -88,8 +87,8 @@ class Stage:
             self._view(view, box, moment, step)
         picture = self._canvas.read()
         for view, box in zip(views, self._boxes, strict=True):
-            if view in sonar.VIEWS and self._sonar:
-                self._sonar.draw(view, picture, box, frame.time)
+            if view in sonar.VIEWS:
+                self._sonar.draw(view, picture, box, frame.time, step)
         self._write(picture, views, moment, frame)
         return picture
 
@@ -131,8 +130,8 @@ class Stage:
     def _name(self, view: str, moment: Moment) -> str:
         """What stands in the corner of a view."""
         kind, _ = split(view)
-        if kind in sonar.VIEWS and self._sonar:
-            return self._sonar.name(kind, moment.time)
+        if kind in sonar.VIEWS:
+            return self._sonar.name(kind)
         if kind == "overview":
             return "overview, squares of 50 m"
         if kind == "dock":

@@ -125,8 +125,8 @@ def _together(playback: Playback, lapse: float) -> tuple[Array, Array, NDArray[n
 def verdict(playback: Playback) -> str:
     """How the run ended, in a line; of several vehicles, how each did."""
     if playback.lone:
-        end, attempt = _end_of(playback.first, "after"), playback.first.at(playback.end).count
-        return f"{end}, attempt {attempt}" if end.startswith("docked") else end
+        end, count = _end_of(playback.first, "after"), playback.first.at(playback.end).count
+        return f"{end}, {count}" if end.startswith("docked") else end
     ends = {name: _end_of(motion, "at") for name, motion in playback.motions.items()}
     return ", ".join(f"{name} {text}" for name, text in ends.items())
 

@@ -63,3 +63,15 @@ def increments(inputs: Sequence[Input], errors: Array) -> Array:
 def wrapped(angle: Array) -> Array:
     """Angles in [-pi, pi)."""
     return np.remainder(angle + np.pi, 2.0 * np.pi) - np.pi
+
+
+def rotation_to(path: Array, other: Array) -> float:
+    """The angle [rad] by which a path (n, 2) is turned clockwise about the origin to come closest to another (n, 2)."""
+    across = path[:, 0] * other[:, 1] - path[:, 1] * other[:, 0]
+    return float(np.arctan2(across.sum(), (path * other).sum()))
+
+
+def turned(path: Array, angle: float) -> Array:
+    """A path (n, 2) of north, east turned clockwise about the origin by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return path @ np.array(((c, s), (-s, c)))

@@ -47,7 +47,7 @@ def stand_in(monkeypatch: pytest.MonkeyPatch) -> Recorder:
     class DrawingError(AuvsimError):
         pass
 
-    def run(scenario, *, seed=0, trial=0, progress=None, path=None, finished=None):
+    def run(scenario, *, seed=0, trial=0, progress=None, path=None):
         log = made(scenario, seed, trial, progress)
         if path is not None:
             write(log, path)

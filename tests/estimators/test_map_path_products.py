@@ -8,7 +8,7 @@ import pytest
 from auvsim.reproduce.paper5.scenes import GRID, Conditions, arc, point_frame, simulate
 from estimators.core.errors import ParameterError
 from estimators.map_path.bound_map import height_information, image_information, match_bound
-from estimators.map_path.feature_map import feature_map
+from estimators.map_path.feature_map import Mosaic, feature_map
 from estimators.map_path.likelihood import FrameModel, Matcher
 from estimators.map_path.matching import Match, Search, match
 from estimators.map_path.poses import between, compose
@@ -33,6 +33,22 @@ def test_the_map_shows_features_where_they_are():
     assert north > 20.0
     with pytest.raises(ParameterError, match="as many"):
         feature_map([], run.poses, GRID)
+
+
+def test_a_map_that_grows_ends_as_the_whole_one():
+    """To the bit; before the last frame it holds what the frames so far hold, nothing of those to come."""
+    run = simulate(arc(Conditions(duration=5)), 8)
+    images = [frame.intensity for frame in run.frames]
+    mosaic = Mosaic(run.poses, GRID, 0.4)
+    assert not mosaic.map.counts.any()
+    for k, (image, pose) in enumerate(zip(images, run.poses, strict=True)):
+        mosaic.add(image, pose)
+        assert mosaic.map.counts.max() <= k + 1
+    whole = feature_map(images, run.poses, GRID, 0.4)
+    assert mosaic.map.image.tobytes() == whole.image.tobytes()
+    assert (mosaic.map.origin, mosaic.map.cell) == (whole.origin, whole.cell)
+    with pytest.raises(ParameterError, match="one frame at least"):
+        Mosaic(run.poses[:0], GRID)
 
 
 def test_the_bound_is_met_by_matches_of_strong_frames():

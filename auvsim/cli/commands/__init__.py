@@ -9,7 +9,7 @@ import tyro
 
 from auvsim.cli.commands.campaigns import Campaign, Report, Reproduce, Stress, Study
 from auvsim.cli.commands.logs import Compare, Estimate, Export, Identify
-from auvsim.cli.commands.planning import Bound, Formation, Modem, ShowVehicle
+from auvsim.cli.commands.planning import Bound, Floor, Formation, Modem, ShowVehicle
 from auvsim.cli.commands.runs import Dock, Manoeuvre, Run, ScenarioText
 from auvsim.cli.commands.views import Metrics, Plot, Video
 
@@ -17,6 +17,7 @@ Command = (
     Dock
     | Run
     | Bound
+    | Floor
     | Campaign
     | Stress
     | Report
@@ -36,7 +37,9 @@ Command = (
     | Annotated[ScenarioText, tyro.conf.subcommand("scenario")]
 )
 
-TAKE_SCENARIO_KEYS = {"dock": Dock, "run": Run, "bound": Bound, "manoeuvre": Manoeuvre, "scenario": ScenarioText}
+TAKE_SCENARIO_KEYS = {
+    "dock": Dock, "run": Run, "bound": Bound, "floor": Floor, "manoeuvre": Manoeuvre, "scenario": ScenarioText,
+}  # fmt: skip
 TAKE_NAMES = {
     "identify": ("--steps",),
     "estimate": ("--estimator", "--sensors"),

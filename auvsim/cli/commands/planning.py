@@ -48,6 +48,38 @@ class Bound:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Floor:
+    """Maps where a sonar's frames can be matched over a floor, before a mission: floor.png and floor.nc.
+
+    The Cramer-Rao bound of one match with the frame that it would be matched with, from relief and backscatter, beside
+    speckle and noise; with the planned lanes. Any key of the scenario is an option too, as of `auvsim run`:
+    `auvsim floor depths.nc --water.terrain.latitude 59.4 --water.terrain.longitude 10.5`.
+    """
+
+    floor: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DEPTHS|SCENARIO.yaml|NAME")]
+    """File of depths on a grid, such as NetCDF by CF conventions, or a scenario whose floor it is, such as survey."""
+    scenario: Annotated[str, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")] = "survey"
+    """Where depths are given: the scenario of the vehicle, its sonar and its lanes."""
+    altitude: float | None = None
+    """Height above the floor [m]; by default that of the mission."""
+    holds: float = 0.1
+    """Standard deviation of a match up to which matching counts as holding [m]."""
+    spacing: float = 1.0
+    """Between points of the map [m]."""
+    out: Path = Path("out")
+    """Folder of the map and the data."""
+
+    def run(self, values: dict[str, Any]) -> int:
+        """Judges the floor with scenario keys that were given as options; returns the exit code."""
+        from auvsim.cli import floor
+
+        return floor.run(
+            self.floor, scenario=self.scenario, values=values, altitude=self.altitude, holds=self.holds,
+            spacing=self.spacing, out=self.out,
+        )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
 class Formation:
     """Shows what ranges to leaders tell a follower: a map of the least error, and the best move of each leader.
 

@@ -62,7 +62,9 @@ class Run:
     trial: int = 0
     """Number of the run under that seed."""
     out: Path = Path("out")
-    """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several."""
+    """Folder of trial.nc, summary.json, run.mp4, and pictures: track.png and estimates.png, or fleet.png of several.
+
+    Of one that navigates by a sonar also sonar.png, feature_map.png and feature_map.nc."""
     video: bool = True
     """Whether to draw run.mp4."""
 

@@ -17,7 +17,7 @@ class Video:
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
     """Log of a trial."""
     camera: tuple[str, ...] = ()
-    """Up to three of overview, follow, above, dock: the main view and those beside it, throughout."""
+    """Up to four of overview, follow, above, dock, and map, sonar of a sonar: the main view and those beside it."""
     speed: float | None = None
     """Speed-up far from the dock; by default such that the video lasts less than a minute."""
     still: Path | None = None
@@ -45,7 +45,10 @@ class Video:
 
 @dataclass(frozen=True, kw_only=True)
 class Plot:
-    """Draws track.png and estimates.png beside a log; of a manoeuvre its own picture, of several vehicles fleet.png."""
+    """Draws track.png and estimates.png beside a log; of a manoeuvre its own picture, of several vehicles fleet.png.
+
+    Of a vehicle that navigates by a sonar also sonar.png, feature_map.png and, as data, feature_map.nc.
+    """
 
     log: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="TRIAL.nc")]
     """Log of a trial."""
