@@ -50,8 +50,7 @@ class DepthGridSettings(Settings):
     variable: str | None = Field(default=None, description="name of the variable, if it is not found by itself")
     positive: Literal["down", "up"] | None = Field(
         default=None,
-        description="whether values are depths (down) or heights (up); by default as the file says, or else as they "
-        "lie below the surface",
+        description="which way values grow, up of heights; none: as the file says, or as they lie below the surface",
     )
     units: Unit | None = Field(default=None, description="of the depths, where the file does not say")
     coordinate_units: Unit | Literal["degrees"] | None = Field(
@@ -62,10 +61,10 @@ class DepthGridSettings(Settings):
     )
     longitude: float | None = Field(default=None, ge=-180.0, le=360.0, description="of the datum [deg]")
     northing: float = Field(
-        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, in metres of their map"
+        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, on their map [metres]"
     )
     easting: float = Field(
-        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, in metres of their map"
+        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, on their map [metres]"
     )
 
 
