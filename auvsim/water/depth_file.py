@@ -16,7 +16,7 @@ from auvsim.water.grid_file import Variable
 from auvsim.water.terrain_grid import Corner, GriddedFloor
 
 MOST_POINTS = 4097  # of a grid along each side
-EVEN = 0.01  # share of its mean by which the steps of a regular grid may differ: coordinates are rounded
+EVEN = 0.1  # share of a step by which points of a regular grid may be off: coordinates are rounded
 DEEPEST, SHALLOWEST = 12_000.0, 0.5  # that the deepest point can be [m]
 STEEPEST = 5.0  # slope on both sides of a point from which on it is an error of sounding [-]
 STEEP = 2.0  # slope that no sea floor has over half of a grid [-]
@@ -50,8 +50,7 @@ class DepthGridSettings(Settings):
     variable: str | None = Field(default=None, description="name of the variable, if it is not found by itself")
     positive: Literal["down", "up"] | None = Field(
         default=None,
-        description="whether values are depths (down) or heights (up); by default as the file says, or else as they "
-        "lie below the surface",
+        description="which way values grow, up of heights; none: as the file says, or as they lie below the surface",
     )
     units: Unit | None = Field(default=None, description="of the depths, where the file does not say")
     coordinate_units: Unit | Literal["degrees"] | None = Field(
@@ -62,10 +61,10 @@ class DepthGridSettings(Settings):
     )
     longitude: float | None = Field(default=None, ge=-180.0, le=360.0, description="of the datum [deg]")
     northing: float = Field(
-        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, in metres of their map"
+        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, on their map [metres]"
     )
     easting: float = Field(
-        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, in metres of their map"
+        default=0.0, ge=-2e7, le=2e7, description="of the datum, for projected grids, on their map [metres]"
     )
 
 
@@ -317,7 +316,7 @@ def _regular(depths: Depths) -> GriddedFloor:
     values = depths.values
     for i, (which, axis) in enumerate((("north", depths.north), ("east", depths.east))):
         steps = np.diff(axis)
-        even = np.ptp(steps) <= EVEN * steps.mean()
+        even = np.abs(axis - np.linspace(axis[0], axis[-1], axis.size)).max() <= EVEN * steps.mean()
         count = axis.size if even else 1 + math.ceil((axis[-1] - axis[0]) / steps.min() - 1e-6)
         if count > MOST_POINTS:
             what = f"{axis.size} points" if even else f"steps of {steps.min():.3g} to {steps.max():.3g} m"

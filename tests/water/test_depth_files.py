@@ -279,6 +279,16 @@ def test_transposed_values_are_found_by_their_coordinates(tmp_path: Path) -> Non
         floor(write(tmp_path / "b.nc", DEPTHS.T, units="m"))
 
 
+def test_steps_that_grow_are_made_even(tmp_path: Path) -> None:
+    """By half a percent from one to the next, a metre off in the middle; coordinates rounded to decimetres stay."""
+    n, e = np.linspace(-60.0, 90.0, 101), EASTS
+    grown = n + 1.0 - ((n - 15.0) / 75.0) ** 2
+    for axis, kept in ((grown, False), (np.round(n, 1), True)):
+        path = write(tmp_path / "a.nc", hill(axis[:, None], e), {**METRES, "y": (axis, {"units": "m"})}, units="m")
+        check(path, within=0.01 if kept else 1e-9)
+        assert (floor(path).depths.shape[0] == 101) == kept
+
+
 def test_settings_that_contradict_the_file(tmp_path: Path) -> None:
     """Units of both; two variables that are depths; a variable that is not there."""
     path = write(tmp_path / "a.nc", DEPTHS, units="m")
