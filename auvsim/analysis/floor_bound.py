@@ -32,6 +32,7 @@ from estimators.map_path.bound_map import height_information, image_information,
 from estimators.map_path.frames import SectorGrid
 
 STRIP = 1_000_000  # points of the floor that are worked on at once
+COARSE = 2.5  # distance of a floor's points by the side of a frame's cell from which on finer relief is missed
 STEP = 1.0  # between points of the planned way at which the bound is told [m]
 
 
@@ -63,6 +64,12 @@ class FloorBound(NamedTuple):
     stations: Array  # (j, 2) of the planned way, every metre, north, east [m]
     along: Array  # (j,) bound there [m]; NaN off the floor
     sight: Sight
+    resolution: float  # between points of the floor [m]
+
+    @property
+    def coarse(self) -> bool:
+        """Whether the floor lacks most of the relief that frames show, so that the bound is too large."""
+        return self.resolution > COARSE * self.sight.grid.cell
 
 
 def floor_bound(scenario: Scenario, *, spacing: float = 1.0, altitude: float | None = None) -> FloorBound:
@@ -90,7 +97,8 @@ def floor_bound(scenario: Scenario, *, spacing: float = 1.0, altitude: float | N
     pattern = getattr(vehicle.mission, "pattern", None)
     way = points(pattern) if pattern is not None and pattern.kind in ("waypoints", "lawn_mower") else np.empty((0, 2))
     at = stations(way)
-    return FloorBound(north, east, bound, depth, way, at, _along(at, north, east, bound), seen)
+    resolution = max(floor.corner.to_north, floor.corner.to_east)
+    return FloorBound(north, east, bound, depth, way, at, _along(at, north, east, bound), seen, resolution)
 
 
 def sight(scenario: Scenario, altitude: float) -> Sight:

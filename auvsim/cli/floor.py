@@ -52,6 +52,12 @@ def run(
         written = floor_bound_files.write(found, holds, out)
     console = Console(markup=False, width=max(WIDTH, Console().width))
     console.print(table(found, holds))
+    if found.coarse:
+        print(
+            f"auvsim: the floor's points are {found.resolution:.3g} m apart: finer relief, which frames show most, is "
+            "not in it, and so the bound is too large",
+            file=sys.stderr,
+        )
     print(f"written: {', '.join(map(str, written))}", file=sys.stderr)
     return 0
 

@@ -51,7 +51,7 @@ class Fan:
     def _picture(self, box: Box) -> Picture:
         """The fan of the frame that is shown."""
         reach, half = float(self._ranges[-1]), float(self._bearings[-1])
-        size = max(10.0, box.height / 20.0)  # of letters [pixels]
+        size = min(max(10.0, box.height / 20.0), 16.0)  # of letters [pixels]
         room = overlay.text_width("20 m", overlay.Style(size)) + 6
         widest = math.sin(min(half, 0.5 * math.pi)) * reach
         scale = min((0.95 * box.height - 2.2 * size) / reach, (0.5 * box.width - room) / widest)  # pixels a metre

@@ -131,7 +131,7 @@ def test_what_cannot_be_judged_is_refused() -> None:
     "terrain", [{"rocks": 0.05}, {"rocks": 0.0}, {"rocks": 0.01, "roughness": 0.1}], ids=lambda t: str([*t.values()])
 )
 def test_matches_of_ray_cast_frames_scatter_as_the_bound_says(terrain: dict[str, float]) -> None:
-    """Over 80 pairs 6 m apart, the heading known: between 0.8 and 2 times the bound's median.
+    """Over 80 pairs 6 m apart, the heading known: between 0.7 and 2 times the bound's median.
 
     Scatter is by the median of absolute values along each axis, since some matches take a wrong peak. The bound is of
     first order and of white noise; a match by a filter that is not the signal's own loses up to that.

@@ -57,6 +57,9 @@ def log() -> VehicleLog:
     }  # fmt: skip
     groups, tables = dict(whole.groups), dict(whole.tables)
     groups["vehicles/remus100/estimate"] = estimate
+    compass = {name: values.copy() for name, values in made["compass"].items()}
+    compass["value"][:, 1:] = (0.11, -0.03)  # pitch, roll
+    groups["vehicles/remus100/sensors/compass"] = compass
     for name, table in TABLES.items():
         path = f"vehicles/remus100/{name}"
         groups[path] = {key: np.array(columns[name][key], dtype=v.array_type) for key, v in table.items()}
@@ -68,6 +71,9 @@ def test_a_turned_path_has_no_error_left(log: VehicleLog) -> None:
     """Of estimates and of keyframes alike; the angle is that by which they have to be turned back."""
     path = sonar_path.sonar_path(log)
     assert path is not None
+    np.testing.assert_allclose(path.images[2], log["path"]["image"][3] * log["path"]["scale"][3])
+    assert (path.grid.cell, path.grid.shape, path.grid.ranges) == (0.5, SHAPE, (0.5, 2.9))
+    assert (path.grid.half_sector, path.grid.ahead) == (1.0, 0.7)
     live, kept = sonar_path.turned_errors(log), sonar_path.turned_path_errors(log, path)
     for found, times in ((live, log["estimate"]["time"]), (kept, STAMPS[1:])):
         assert found is not None
@@ -116,7 +122,7 @@ def test_lines_of_closures_join_the_two_places(log: VehicleLog) -> None:
     overlay = sonar_map.overlay(log, path)
     then = interpolate(np.array([128.0]), log["estimate"]["time"], log["estimate"]["position"][:, :2])[0]
     np.testing.assert_allclose(overlay.closures, [(then, path.poses[1, :2])])
-    assert overlay.label.startswith("loop closures: 1 of ")
+    assert overlay.label.endswith("loop closures believed, 1 drawn")
     axes = sonar_map.map_figure(path.images, path.poses, path.grid, overlay=overlay).axes[0]
     (drawn,) = axes.collections[0].get_segments()  # pyright: ignore[reportAttributeAccessIssue]
     np.testing.assert_allclose(drawn, [then[::-1], path.poses[1, 1::-1]])
@@ -142,8 +148,8 @@ def test_the_file_holds_map_attitude_and_covariance(log: VehicleLog, tmp_path) -
     np.testing.assert_allclose(
         held["path"]["depth"], np.interp(path.times, truth["time"], truth["position"][:, 2]), atol=0.01
     )
-    assert held["path"]["roll"] == pytest.approx(0.0)  # the made-up compass reads 0 where the vehicle pitches
-    assert held["path"]["pitch"] == pytest.approx(0.0)
+    assert held["path"]["roll"] == pytest.approx(-0.03)
+    assert held["path"]["pitch"] == pytest.approx(0.11)
 
 
 def test_the_picture_shows_errors_and_closures(log: VehicleLog) -> None:

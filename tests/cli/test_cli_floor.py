@@ -34,7 +34,8 @@ def grid(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_shares_and_files_of_a_grid(grid: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Half of the floor and half of the lanes; the longest stretch that does not hold is a lane's southern part."""
     assert cli.main(["floor", str(grid), "--spacing", "2", "--holds", "0.3", "--out", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
+    printed, told = capsys.readouterr()
+    assert "apart" not in told
     row = next(line for line in printed.splitlines() if "(holds)" in line)
     floor, way = (float(share) / 100.0 for share in re.findall(r"([\d.]+)%", row))
     # The mean over a sector of 20 m sees the edge from 10 m away.
@@ -51,6 +52,13 @@ def test_shares_and_files_of_a_grid(grid: Path, tmp_path: Path, capsys: pytest.C
     assert stretch == longest(~(along <= 0.3))
     assert stretch == pytest.approx(2.0 * 60.0 + 7.0, abs=22.0)  # down one lane and up the next
     assert (tmp_path / "floor.png").stat().st_size > 20_000
+
+
+def test_a_coarse_floor_is_said_to_be_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Most bathymetry has no relief as fine as frames show."""
+    coarse = ["--water.terrain.spacing", "2.0", "--water.terrain.rock_radius", "2.0"]
+    assert cli.main(["floor", "survey", *coarse, "--out", str(tmp_path)]) == 0
+    assert "points are 2 m apart: finer relief" in capsys.readouterr().err
 
 
 def test_longest_run() -> None:

@@ -6,11 +6,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from synthetic import truth, writer
 
 from auvsim.analysis.sonar_map import CELL, map_figure
 from auvsim.base.frames import Array
+from auvsim.missions.docking.guidance import Docking
+from auvsim.missions.survey.mission import Survey
 from auvsim.video import sonar, sonar_fan
 from auvsim.video.canvas import Box, Picture
+from auvsim.video.motion import Motion
 from auvsim.video.sonar import Frames, Laid, estimated
 from auvsim.video.sonar_fan import Fan
 from auvsim.video.sonar_map import UNSEEN, GrowingMap
@@ -152,6 +156,20 @@ def test_a_frame_stands_for_a_while() -> None:
         shown.append(fan.name)
     assert len(set(shown)) == 3
     assert shown[0] == shown[12] != shown[13] == shown[25] != shown[26]
+
+
+def test_lanes_count_waypoints_and_approaches_attempts() -> None:
+    """Of a mission that logs both; on its way to either it counts nothing."""
+    log, found = writer("survey"), {}
+    for k, phase in enumerate(("fix", "lanes", "home", "final")):
+        log.truth(truth(float(k), (k, 0.0, 5.0)))
+        names = [*Docking.variables, "waypoint", "leg_cross_track", "floor"]
+        own = {**dict.fromkeys(names, 0.0), "attempt": 2, "waypoint": 7}
+        log.append("mission", (float(k), Survey.phases.index(phase), 0.0, 5.0, 1.5, *(own[n] for n in names)))
+    moving = Motion(log.finish("complete"))
+    for k, phase in enumerate(("fix", "lanes", "home", "final")):
+        found[phase] = moving.at(k + 0.5).count
+    assert found == {"fix": "", "lanes": "waypoint 7", "home": "", "final": "attempt 2"}
 
 
 def test_views_are_those_that_there_are_frames_for(images: Array, monkeypatch) -> None:
