@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from auvsim.reproduce.paper5.scenes import GRID, SATURATION, Conditions, Run
+from auvsim.reproduce.paper5.scenes import SATURATION, Conditions, Run
 from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter
 from estimators.core.models.sensors import fix
@@ -20,12 +20,14 @@ from estimators.map_path.landmarks import LandmarkFilter
 from estimators.map_path.likelihood import FrameModel, Matcher, Weighting
 from estimators.map_path.odometry import MOTION, OdometryNoise
 from estimators.map_path.particles import ParticlePathFilter
-from estimators.map_path.window import WindowFilter
+from estimators.map_path.window import Window, WindowFilter
 
 KEEP = 6.0  # age up to which frames are used [s]
 START = np.diag(np.square((0.01, 0.01, 1e-4)))  # the study is about drift: the start is known [m, m, rad]
 FLOOR_SPREAD = 0.2  # assumed of frames of the ray-cast sonar, less than a cell [m]
 FLOOR_SNR = 9.5  # assumed of the same: a tenth of the variance is the floor's [dB]
+# Relief, over an altitude, moves echoes aside and nearer; how much of that lasts was chosen on other seeds.
+FLOOR_WINDOW = Window(scatter=True, relief=0.0065, relief_time=40.0)
 GPS_DEVIATION = 2.0  # of a fix, each axis [m]
 
 
@@ -76,7 +78,7 @@ def follow(run: Run, estimator_filter, fixes: Mapping[int, Measurement] | None =
 
 
 def _matcher(run: Run, weighting: Weighting = "field") -> Matcher:
-    return Matcher(GRID, frame_model(run.conditions, weighting))
+    return Matcher(run.grid, frame_model(run.conditions, weighting))
 
 
 def _start(run: Run) -> Gaussian:
@@ -133,6 +135,12 @@ def surfacing(run: Run, interval: int) -> Track:
     return follow(run, ModelFilter(noise.process(), {"gps": gps}, noise.start(_start(run))), fixes)[0]
 
 
+def window(run: Run) -> Track:
+    """Frame to window; over a floor with relief, that is a part of the state."""
+    settings = FLOOR_WINDOW if run.conditions.frames == "floor" else Window(scatter=True)
+    return follow(run, WindowFilter(_matcher(run), _start(run), window=settings, saturation=SATURATION))[0]
+
+
 def _filtered(make, run: Run, weighting: Weighting = "field") -> Track:
     return follow(run, make(_matcher(run, weighting), _start(run), saturation=SATURATION))[0]
 
@@ -143,7 +151,7 @@ METHODS: dict[str, Callable[[Run], Track]] = {
     "per_frame": partial(path, flat=True),
     "dp_point": partial(path, weighting="point"),
     "dp": path,
-    "window": partial(_filtered, WindowFilter),
+    "window": window,
     "particles": partial(_filtered, ParticlePathFilter),
     "graph": graph,
     "landmarks": partial(_filtered, LandmarkFilter, weighting="point"),
