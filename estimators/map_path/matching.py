@@ -69,7 +69,7 @@ def match(
     posterior = likelihood(offsets) - 0.5 * np.einsum("ni,ij,nj->n", offsets, information, offsets)
     centre = offsets[int(np.argmax(posterior))]
     for _ in range(2):
-        value, gradient, curvature = _quadratic(likelihood(centre + _POINTS * search.fine), np.array(search.fine))
+        value, gradient, curvature = quadratic(likelihood(centre + POINTS * search.fine), np.array(search.fine))
         if np.linalg.eigvalsh(curvature)[0] <= 0.0:
             return NO_PEAK
         best = np.linalg.solve(curvature + information, gradient + curvature @ centre)
@@ -129,14 +129,15 @@ def _lattice(prior: Array, search: Search) -> Array:
     return np.stack(np.meshgrid(*axes, indexing="ij"), axis=3).reshape(-1, 3)
 
 
-_POINTS = np.stack(np.meshgrid(*[np.array([-1.0, 0.0, 1.0])] * 3, indexing="ij"), axis=3).reshape(-1, 3)
+# Where the quadratic is fitted, in its spacing.
+POINTS = np.stack(np.meshgrid(*[np.array([-1.0, 0.0, 1.0])] * 3, indexing="ij"), axis=3).reshape(-1, 3)
 _PAIRS = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
 _FIT = np.linalg.pinv(
-    np.column_stack((np.ones(27), _POINTS, *(_POINTS[:, i] * _POINTS[:, j] for i, j in _PAIRS)))
+    np.column_stack((np.ones(27), POINTS, *(POINTS[:, i] * POINTS[:, j] for i, j in _PAIRS)))
 )  # coefficients of the quadratic of least squares through the 27 points
 
 
-def _quadratic(values: Array, spacing: Array) -> tuple[float, Array, Array]:
+def quadratic(values: Array, spacing: Array) -> tuple[float, Array, Array]:
     """Value, gradient (3,) and negative Hessian (3, 3) at the middle of the 27 points."""
     coefficients = _FIT @ values
     curvature = np.zeros((3, 3))

@@ -28,6 +28,7 @@ FLOOR_SPREAD = 0.2  # assumed of frames of the ray-cast sonar, less than a cell 
 FLOOR_SNR = 9.5  # assumed of the same: a tenth of the variance is the floor's [dB]
 # Relief, over an altitude, moves echoes aside and nearer; how much of that lasts was chosen on other seeds.
 FLOOR_WINDOW = Window(scatter=True, relief=0.0065, relief_time=40.0)
+SEEN = 12  # frames that show a place, about
 GPS_DEVIATION = 2.0  # of a fix, each axis [m]
 
 
@@ -106,7 +107,7 @@ def path(run: Run, weighting: Weighting = "field", flat: bool = False) -> Track:
 def graph(run: Run) -> Track:
     """The pose graph, from the path of dynamic programming; without loop closures, as no place is seen again."""
     first, begin = path(run), time.process_time()
-    matcher = _matcher(run)
+    matcher = Matcher(run.grid, replace(frame_model(run.conditions), together=SEEN))
     frames = {round(f.stamp): matcher.prepare(f.intensity) for f in run.frames}
     ready = [frames.get(k) for k in range(len(run.poses))]
     solved = pose_graph.solve(matcher, ready, first.poses, START, close_loops=False).solution
