@@ -17,7 +17,6 @@ import numpy as np
 from auvsim.base.frames import Array
 from estimators.map_path.frames import PolarGrid, SectorGrid, SonarFrame, to_sector
 
-SURROUNDINGS = 1.0  # standard deviation of the Gaussian over which their mean is taken [m]
 LEAST_HEARD = 100  # cells within the sonar's ranges, fewer and a frame shows nothing
 BLANK = 1e-9  # spread of a frame below which it shows nothing
 LEAST = 1e-9  # intensity by the mean of its frame below which the logarithm is cut
@@ -30,6 +29,7 @@ class SectorFrames:
 
     polar: PolarGrid  # of the sonar, its ranges slant
     grid: SectorGrid
+    surroundings: float = 1.0  # standard deviation of the Gaussian over which the mean of a cell's is taken [m]
     nearer: float = 0.0  # by which echoes come from before the middle of rocks, along the slant range [m]
 
     def frame(self, intensity: np.ndarray, *, altitude: float, stamp: float, sequence: int | None = None) -> SonarFrame:
@@ -61,7 +61,7 @@ class SectorFrames:
         """An image (rows, columns) without the mean of each cell's surroundings, of the cells that are seen."""
         from scipy.ndimage import gaussian_filter
 
-        width = SURROUNDINGS / self.grid.cell
+        width = self.surroundings / self.grid.cell
         shares = np.maximum(gaussian_filter(self.grid.seen.astype(float), width), 1e-12)
         return image - gaussian_filter(image, width) / shares
 

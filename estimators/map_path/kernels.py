@@ -39,6 +39,24 @@ def products(values, places, fine, scale, origin_row, origin_column, poses):
 
 
 @compiled
+def samples(places, fine, scale, origin_row, origin_column, poses):
+    """Values (k, n) of an upsampled earlier frame at the cells' places seen from relative poses (k, 3).
+
+    Arguments as of `products`; 0 outside.
+    """
+    values = np.zeros((poses.shape[0], places.shape[0]))
+    for k in range(poses.shape[0]):
+        c, s = math.cos(poses[k, 2]) * scale, math.sin(poses[k, 2]) * scale
+        first, second = (poses[k, 0] - origin_row) * scale, (poses[k, 1] - origin_column) * scale
+        for n in range(places.shape[0]):
+            row = first + c * places[n, 0] - s * places[n, 1]
+            seen = _bilinear(fine, row, second + s * places[n, 0] + c * places[n, 1])
+            if seen == seen:
+                values[k, n] = seen
+    return values
+
+
+@compiled
 def square_differences(values, places, fine, scale, origin_row, origin_column, poses):
     """Sums (k,) of squared differences of `values` (n,) from an upsampled earlier frame (paper 5, eq. 4).
 

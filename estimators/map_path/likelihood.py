@@ -51,6 +51,7 @@ class Prepared(NamedTuple):
 
     values: Array  # (rows, columns) filtered
     fine: Array  # (5 rows, 5 columns) the same, upsampled
+    scatter: float = np.nan  # of its match with those before, see `matching.Match`; NaN of one that was not matched
 
 
 class Matcher:
@@ -92,6 +93,20 @@ class Matcher:
         if self.model.weighting == "literal":
             return -kernels.square_differences(*arguments) / (4.0 * self.model.noise**2)
         return kernels.products(*arguments)
+
+    def seen(self, earlier: Prepared, poses: Array, cells: np.ndarray) -> Array:
+        """An earlier frame (k, rows, columns) where some cells see it from relative poses (k, 3); 0 elsewhere."""
+        images = np.zeros((len(poses), *self.grid.shape))
+        places = np.ascontiguousarray(self._places[cells])
+        arguments = (places, earlier.fine, self._density, *self._corner, np.ascontiguousarray(poses))
+        images[:, self._index[0][cells], self._index[1][cells]] = kernels.samples(*arguments)
+        return images
+
+    @cached_property
+    def _index(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows and columns of the cells of the sector."""
+        row, column = np.nonzero(self.grid.seen)
+        return row, column
 
     @cached_property
     def noise_filtered(self) -> float:

@@ -10,7 +10,7 @@ from estimators.core.types import Array
 from estimators.map_path.closures import consistent, path_covariance
 from estimators.map_path.graph import Edge, GraphSolution, optimise
 from estimators.map_path.likelihood import Matcher, Prepared
-from estimators.map_path.matching import Match, Search, match
+from estimators.map_path.matching import LEAST_CELLS, POINTS, Match, Search, match, quadratic
 from estimators.map_path.poses import between, compose
 
 FARTHEST = 10.0  # that a match may lie from the predicted pose, in limits of the search; its peak is no match then
@@ -20,7 +20,9 @@ FARTHEST = 10.0  # that a match may lie from the predicted pose, in limits of th
 class GraphSettings:
     """What a pose graph is made of. Covariances are diagonal, of forward, starboard [m] and turn [rad]."""
 
-    lags: tuple[int, ...] = (1, 2, 4, 8)  # frames apart that are matched
+    lags: tuple[int, ...] = (1, 2, 4, 8)  # frames apart that are searched for a match
+    refined: tuple[int, ...] = tuple(range(1, 13))  # frames apart that are compared once more about the solution
+    rounds: int = 3  # times that is done; 0: never
     chain: tuple[float, float, float] = (0.2, 0.2, np.radians(0.6))  # of the path given from frame to frame, deviations
     drift: tuple[float, float, float] = (0.05, 0.05, np.radians(0.08))  # what such a path gathers a frame, deviations
     match_prior: tuple[float, float, float] = (0.1, 0.1, np.radians(0.5))  # added to that where a match is searched
@@ -56,7 +58,7 @@ def solve(
     """The most probable poses of frames.
 
     Args:
-        matcher: Compares two frames.
+        matcher: Compares two frames; its model's `together` is the number of frames that show the same floor.
         frames: One for each pose; None where there was none that could be used.
         path: Poses (n, 3) of a filter, from which it starts.
         prior: Covariance (3, 3) of the first pose.
@@ -69,6 +71,9 @@ def solve(
     solution = optimise(path, edges, prior, fixes=fixes)
     for lag in settings.lags:  # each is searched about what the shorter ones say
         edges += _neighbours(matcher, frames, solution.poses, lag, settings)
+        solution = optimise(solution.poses, edges, prior, fixes=fixes)
+    for _ in range(settings.rounds):
+        edges = _chain(path, settings) + _refined(matcher, frames, solution.poses, settings)
         solution = optimise(solution.poses, edges, prior, fixes=fixes)
     if not close_loops:
         return PathGraph(solution, tuple(edges), (), ())
@@ -99,6 +104,33 @@ def _neighbours(
         found = match(matcher, later, [earlier], relative[None], prior, settings.search)
         if isinstance(found, Match) and (np.abs(found.offset) <= FARTHEST * np.array(settings.search.limits)).all():
             edges.append(edge(k - lag, k, relative, found, settings.covariance_factor))
+    return edges
+
+
+def _refined(matcher: Matcher, frames: Sequence[Prepared | None], path: Array, settings: GraphSettings) -> list[Edge]:
+    """Edges of all pairs of frames some way apart, of the log-likelihood's gradient at the path: a step of scoring.
+
+    The curvature of a pair is the mean over pairs as far apart, by the cells shared (Fisher's scoring). With its own
+    one a pair of faint frames has no peak, or one of the noise; so it has its share of the sum over all pairs, whose
+    peak is sharp.
+    """
+    spacing, edges = np.array(settings.search.fine), []
+    for lag in settings.refined:
+        compared = []
+        for k in range(lag, len(path)):
+            earlier, later = frames[k - lag], frames[k]
+            relative = between(path[k - lag], path[k])
+            cells = matcher.shared_cells(relative)
+            if earlier is not None and later is not None and np.count_nonzero(cells) >= LEAST_CELLS:
+                values = matcher.log_likelihood(later, earlier, compose(relative, POINTS * spacing), cells)
+                compared.append((k, relative, np.count_nonzero(cells), *quadratic(values, spacing)[1:]))
+        mean = sum(each[4] for each in compared) / max(sum(each[2] for each in compared), 1)
+        if not compared or np.linalg.eigvalsh(mean)[0] <= 0.0:
+            continue
+        for k, relative, count, gradient, _ in compared:
+            covariance, turned = np.linalg.inv(count * mean), _turn(relative[2])
+            measured = compose(relative, covariance @ gradient)
+            edges.append(Edge(k - lag, k, measured, turned @ covariance @ turned.T))
     return edges
 
 

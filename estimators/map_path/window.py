@@ -32,6 +32,9 @@ class Window:
     lags: tuple[int, ...] = (1, 2, 3, 4, 6, 8, 10, 12)  # of these, counted from the latest
     interval: int = 1  # frames from one that is matched to the next
     covariance_factor: float = 1.0  # of a match, for what the frames' model leaves out: relief, errors that last
+    scatter: bool = False  # whether that is learnt from the frames beside it, see `matching.score_covariance`
+    relief: float = 0.0  # relative error of distances between frames, along and across, deviation; states unless 0 [-]
+    relief_time: float = np.inf  # time constant with which those decay [s]
 
 
 class WindowState(NamedTuple):
@@ -77,10 +80,11 @@ class WindowFilter:
         search: Search | None = None,
         saturation: float = np.inf,
     ) -> None:
-        noise = noise or OdometryNoise()
-        self._start, self._window, self._search = noise.start(start), window or Window(), search or Search()
-        model = replace(matcher.model, together=len(self._window.lags))
-        self.matcher, self.process = Matcher(matcher.grid, model), noise.process()
+        noise, window = noise or OdometryNoise(), window or Window()
+        self._start, self._window, self._search = noise.start(start, window.relief), window, search or Search()
+        model = replace(matcher.model, together=len(window.lags))
+        self.matcher, self.process = Matcher(matcher.grid, model), noise.process(window.relief, window.relief_time)
+        self._relief = slice(5, 8) if window.relief else None  # which of the states
         self.sensors: Models = {}
         self._saturation = saturation
 
@@ -102,7 +106,8 @@ class WindowFilter:
             if not reason:
                 frame = self.matcher.prepare(measurement.value)
                 if state.frames and state.count % self._window.interval == 0:
-                    state, reason, nis = self._placed(state, frame)
+                    state, reason, nis, scatter = self._placed(state, frame)
+                    frame = frame._replace(scatter=scatter)
                 state = self._with(state, frame)
             state = state._replace(verdicts=(*state.verdicts, (measurement, reason, nis)))
         return state
@@ -111,24 +116,29 @@ class WindowFilter:
         """For `smoothing`."""
         return self.process
 
-    def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float]:
-        """State with a frame matched against the window, or why it was not, and the match's NIS."""
+    def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float, float]:
+        """State with a frame matched against the window, or why it was not, the match's NIS and how it scatters."""
         chosen = [len(state.frames) - lag for lag in self._window.lags if lag <= len(state.frames)]
         if not chosen:
-            return state, NO_OVERLAP, np.nan
+            return state, NO_OVERLAP, np.nan, np.nan
         earlier = [state.frames[k] for k in chosen]
         relation = Relation.of_pose(state.whole, state.size, [state.size + 3 * k for k in chosen])
         prior = relation.covariance(0) + 1e-8 * np.eye(3)
-        found = match(self.matcher, frame, earlier, relation.relatives, prior, self._search)
+        relatives = relation.relatives
+        if self._relief is not None:
+            relatives = relatives + relation.by_relief() @ state.whole.mean[self._relief]
+        found = match(self.matcher, frame, earlier, relatives, prior, self._search, self._window.scatter)
         if isinstance(found, str):
-            return state, found, np.nan
+            return state, found, np.nan, np.nan
         H = relation.jacobian(found.weights)
+        if self._relief is not None:
+            H[:, self._relief] = np.tensordot(found.weights, relation.by_relief(later_axes=True), 1)
         limit = chi_square(NIS_GATE, 3)
-        R = self._window.covariance_factor * found.covariance
+        R = self._window.covariance_factor * _scatter(state.frames, found.scatter) * found.covariance
         whole, innovation = ekf.correct_linear(state.whole, H, found.offset, R, limit)
         if not innovation.accepted:
-            return state._replace(outliers=state.outliers + 1), OUTLIER, innovation.nis
-        return state._replace(whole=with_angles(whole, state.size)), "", innovation.nis
+            return state._replace(outliers=state.outliers + 1), OUTLIER, innovation.nis, found.scatter
+        return state._replace(whole=with_angles(whole, state.size)), "", innovation.nis, found.scatter
 
     def _with(self, state: WindowState, frame: Prepared) -> WindowState:
         """State with the vehicle's pose cloned as that of a frame, and without the oldest frame too many."""
@@ -167,6 +177,14 @@ class Relation(NamedTuple):
         both = np.hstack(self.derivatives[which][::-1])
         return both @ self.whole.covariance[np.ix_(places, places)] @ both.T
 
+    def by_relief(self, later_axes: bool = False) -> Array:
+        """Derivative (k, 3, 3) of what frames show of the relative poses by the states `odometry.RELIEF`."""
+        moved = -between(self.relatives, np.zeros(3)) if later_axes else self.relatives
+        derivative = np.zeros((len(moved), 3, 3))
+        derivative[:, 0, :2], derivative[:, 1, :2] = moved[:, [0, 1]] * (1.0, -1.0), moved[:, [1, 0]]
+        derivative[:, 2, 2] = np.hypot(moved[:, 0], moved[:, 1])
+        return derivative
+
     def jacobian(self, weights: Array) -> Array:
         """Derivative (3, n + 3 k) of the mean of the relative poses with some weights (k,) by the whole state."""
         H = np.zeros((3, self.whole.mean.size))
@@ -174,6 +192,12 @@ class Relation(NamedTuple):
             H[:, self.later : self.later + 3] += weight * by_later
             H[:, place : place + 3] += weight * by_earlier
         return H
+
+
+def _scatter(frames: Sequence[Prepared], own: float) -> float:
+    """Geometric mean of the scatter of a match and of those of frames before, as each alone is noisy; 1 of none."""
+    known = [s for s in (own, *(frame.scatter for frame in frames)) if np.isfinite(s)]
+    return float(np.exp(np.mean(np.log(known)))) if known else 1.0
 
 
 def predicted(whole: Gaussian, size: int, process: ProcessModel, u: Input, duration: float) -> Gaussian:

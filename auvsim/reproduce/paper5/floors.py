@@ -19,6 +19,10 @@ DEPTH = 20.0  # of the floor on average [m]
 ALTITUDE = 5.0  # of the vehicle above that, on one depth; the sonar's SNR is as of it [m]
 SPACING = 0.1  # of the floor's points [m]
 BESIDE = 22.0  # floor beside the path [m]
+SMOOTHING = 30  # frames over which the floor's depth is averaged, as on missions
+SURROUNDINGS = (
+    0.5  # see `SectorFrames`; a wider mean leaves light that moves with the vehicle and draws matches short [m]
+)
 MAXIMUM_RANGE = 21.0  # slant, to the end of the frames' sector [m]
 
 
@@ -46,7 +50,10 @@ class Floor:
 def floor_frames(
     poses: Array, grid: SectorGrid, *, rocks: float, snr: float, seed: int, generator: Generator
 ) -> tuple[SonarFrame, ...]:
-    """A frame at each pose, at steps of 1 s, over the floor of a seed; the altitude is that of an altimeter.
+    """A frame at each pose, at steps of 1 s, over the floor of a seed.
+
+    The altitude is above the mean depth below the vehicle of late, by an altimeter: above each bump, features that lie
+    ahead would move by metres of range times its height over the altitude.
 
     Args:
         poses: (k, 3) north, east [m], heading [rad].
@@ -64,12 +71,13 @@ def floor_frames(
     world = Floor(build_terrain(settings, DEPTH))
     sonar = ImagingSonar(ImagingSonarSettings(snr=snr, maximum_range=MAXIMUM_RANGE), generator)
     polar = PolarGrid(bearings=tuple(sonar.bearings.tolist()), ranges=tuple(sonar.ranges.tolist()))
-    maker = SectorFrames(polar=polar, grid=grid)
-    frames = []
+    maker = SectorFrames(polar=polar, grid=grid, surroundings=SURROUNDINGS)
+    frames, altitude = [], 0.0
     for k, pose in enumerate(poses):
         truth = _at(float(k), pose)
         below = world.terrain.depth(pose[0], pose[1]) - (DEPTH - ALTITUDE)
-        frames.append(maker.frame(sonar.image(truth, world), altitude=below, stamp=float(k), sequence=k))
+        altitude += (below - altitude) / min(k + 1, SMOOTHING)
+        frames.append(maker.frame(sonar.image(truth, world), altitude=altitude, stamp=float(k), sequence=k))
     return tuple(frames)
 
 

@@ -9,7 +9,7 @@ from functools import partial
 
 import numpy as np
 
-from auvsim.reproduce.paper5.scenes import GRID, SATURATION, Conditions, Run
+from auvsim.reproduce.paper5.scenes import SATURATION, Conditions, Run
 from estimators.core.estimator import Estimator
 from estimators.core.filter import ModelFilter
 from estimators.core.models.sensors import fix
@@ -20,12 +20,15 @@ from estimators.map_path.landmarks import LandmarkFilter
 from estimators.map_path.likelihood import FrameModel, Matcher, Weighting
 from estimators.map_path.odometry import MOTION, OdometryNoise
 from estimators.map_path.particles import ParticlePathFilter
-from estimators.map_path.window import WindowFilter
+from estimators.map_path.window import Window, WindowFilter
 
 KEEP = 6.0  # age up to which frames are used [s]
 START = np.diag(np.square((0.01, 0.01, 1e-4)))  # the study is about drift: the start is known [m, m, rad]
 FLOOR_SPREAD = 0.2  # assumed of frames of the ray-cast sonar, less than a cell [m]
 FLOOR_SNR = 9.5  # assumed of the same: a tenth of the variance is the floor's [dB]
+# Relief, over an altitude, moves echoes aside and nearer; how much of that lasts was chosen on other seeds.
+FLOOR_WINDOW = Window(scatter=True, relief=0.0065, relief_time=40.0)
+SEEN = 12  # frames that show a place, about
 GPS_DEVIATION = 2.0  # of a fix, each axis [m]
 
 
@@ -76,7 +79,7 @@ def follow(run: Run, estimator_filter, fixes: Mapping[int, Measurement] | None =
 
 
 def _matcher(run: Run, weighting: Weighting = "field") -> Matcher:
-    return Matcher(GRID, frame_model(run.conditions, weighting))
+    return Matcher(run.grid, frame_model(run.conditions, weighting))
 
 
 def _start(run: Run) -> Gaussian:
@@ -104,7 +107,7 @@ def path(run: Run, weighting: Weighting = "field", flat: bool = False) -> Track:
 def graph(run: Run) -> Track:
     """The pose graph, from the path of dynamic programming; without loop closures, as no place is seen again."""
     first, begin = path(run), time.process_time()
-    matcher = _matcher(run)
+    matcher = Matcher(run.grid, replace(frame_model(run.conditions), together=SEEN))
     frames = {round(f.stamp): matcher.prepare(f.intensity) for f in run.frames}
     ready = [frames.get(k) for k in range(len(run.poses))]
     solved = pose_graph.solve(matcher, ready, first.poses, START, close_loops=False).solution
@@ -133,6 +136,12 @@ def surfacing(run: Run, interval: int) -> Track:
     return follow(run, ModelFilter(noise.process(), {"gps": gps}, noise.start(_start(run))), fixes)[0]
 
 
+def window(run: Run) -> Track:
+    """Frame to window; over a floor with relief, that is a part of the state."""
+    settings = FLOOR_WINDOW if run.conditions.frames == "floor" else Window(scatter=True)
+    return follow(run, WindowFilter(_matcher(run), _start(run), window=settings, saturation=SATURATION))[0]
+
+
 def _filtered(make, run: Run, weighting: Weighting = "field") -> Track:
     return follow(run, make(_matcher(run, weighting), _start(run), saturation=SATURATION))[0]
 
@@ -143,7 +152,7 @@ METHODS: dict[str, Callable[[Run], Track]] = {
     "per_frame": partial(path, flat=True),
     "dp_point": partial(path, weighting="point"),
     "dp": path,
-    "window": partial(_filtered, WindowFilter),
+    "window": window,
     "particles": partial(_filtered, ParticlePathFilter),
     "graph": graph,
     "landmarks": partial(_filtered, LandmarkFilter, weighting="point"),

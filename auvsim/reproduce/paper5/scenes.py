@@ -17,6 +17,8 @@ REACH = 3.0  # features up to this far outside the frame still shine into it [m]
 SATURATION = 50.0  # value at which the receiver saturates
 LATENESS = 1.5  # of late frames [s]
 GRID = SectorGrid()
+# Of ray-cast frames, fine as their sonar; nearer there is no beam and farther no echo that would show the floor.
+FLOOR_GRID = SectorGrid(cell=0.25, shape=(68, 136), ranges=(4.0, 17.0))
 ARRAY = LineArray()
 
 
@@ -48,6 +50,11 @@ class Run:
     frames: tuple[SonarFrame, ...]
 
     @property
+    def grid(self) -> SectorGrid:
+        """Of the frames."""
+        return FLOOR_GRID if self.conditions.frames == "floor" else GRID
+
+    @property
     def dead_reckoning(self) -> Array:
         """Poses (k, 3) by odometry alone."""
         return dead_reckoned(self.poses[0], self.inputs)
@@ -76,7 +83,9 @@ def simulate(conditions: Conditions, seed: int, motion: tuple[Input, ...] | None
     low, high = poses[:, :2].min(axis=0) - 25.0, poses[:, :2].max(axis=0) + 25.0
     features = place.uniform(low, high, (place.poisson(conditions.density * np.prod(high - low)), 2))
     if conditions.frames == "floor":
-        frames = floor_frames(poses, GRID, rocks=conditions.density, snr=conditions.snr, seed=seed, generator=noise)
+        frames = floor_frames(
+            poses, FLOOR_GRID, rocks=conditions.density, snr=conditions.snr, seed=seed, generator=noise
+        )
     else:
         render = _array_frame if conditions.frames == "array" else point_frame
         frames = tuple(
