@@ -19,7 +19,6 @@ from auvsim.missions.track.patterns import points
 from auvsim.navigation import registry
 from auvsim.navigation.measurements import of_kind
 from auvsim.navigation.sonar import POINT_SPREAD, SonarNavigator
-from auvsim.navigation.sonar_frames import SURROUNDINGS
 from auvsim.sensors.imaging_sonar import ImagingSonar, ImagingSonarSettings
 from auvsim.sensors.sonar_echo import BESIDE
 from auvsim.simulation.scenario import Scenario
@@ -51,6 +50,7 @@ class Sight(NamedTuple):
     overlap: float  # share of its cells that a frame has in common with the one that it is matched with
     apart: float  # way from one to the other [m]
     altitude: float  # [m]
+    surroundings: float  # standard deviation of the Gaussian whose mean is taken out of frames [m]
 
 
 class FloorBound(NamedTuple):
@@ -119,7 +119,7 @@ def sight(scenario: Scenario, altitude: float) -> Sight:
     apart = float(getattr(vehicle.mission, "speed", 1.0)) * vehicle.estimator.stride / settings.rate  # pyright: ignore
     grid = navigator.grid
     overlap = float(grid.holds(grid.centres[grid.seen] + (apart, 0.0)).mean())
-    return Sight(grid, gains, max(overlap, 0.01), apart, altitude)
+    return Sight(grid, gains, max(overlap, 0.01), apart, altitude, navigator._frames.surroundings)
 
 
 def frame_gains(sonar: ImagingSonar, grid: SectorGrid, altitude: float) -> Gains:
@@ -156,7 +156,9 @@ def _over(floor: GriddedFloor, seen: Sight, spacing: float) -> tuple[Array, Arra
         for count, step in zip(floor.depths.shape, (floor.corner.to_north, floor.corner.to_east), strict=True)
     )
     every = max(1, round(spacing / cell))
-    margin = math.ceil((0.5 * math.sqrt(np.count_nonzero(seen.grid.seen)) * seen.grid.cell + 5.0 * SURROUNDINGS) / cell)
+    margin = math.ceil(
+        (0.5 * math.sqrt(np.count_nonzero(seen.grid.seen)) * seen.grid.cell + 5.0 * seen.surroundings) / cell
+    )
     height = max(every, STRIP // columns // every * every)
     bounds, depths = [], []
     for start in range(0, rows, height):
@@ -196,7 +198,7 @@ def _sampled(floor: GriddedFloor, cell: float, rows: slice, columns: int) -> tup
 
 def _bound(depth: Array, strength: Array | None, cell: float, seen: Sight) -> Array:
     """The bound (m, n) of depths (m, n) and logarithms of backscatter, whose broad variation frames do not show."""
-    width = SURROUNDINGS / cell
+    width = seen.surroundings / cell
     information = height_information(depth - gaussian_filter(depth, width), cell, POINT_SPREAD, seen.gains.slope)
     if strength is not None:
         detail = seen.gains.strength * (strength - gaussian_filter(strength, width))

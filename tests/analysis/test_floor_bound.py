@@ -26,7 +26,7 @@ from estimators.map_path.matching import Search, match
 from estimators.map_path.poses import between, compose
 
 GRID = SectorGrid(cell=0.4, shape=(25, 50), ranges=(2.0, 10.0), half_sector=1.0, ahead=0.8)
-SIGHT = Sight(grid=GRID, gains=Gains(slope=4.0, strength=1.1), overlap=0.6, apart=3.0, altitude=4.0)
+SIGHT = Sight(grid=GRID, gains=Gains(slope=4.0, strength=1.1), overlap=0.6, apart=3.0, altitude=4.0, surroundings=1.0)
 CORNER = Corner(-30.0, 12.0, 0.2, 0.25)
 
 
