@@ -179,3 +179,18 @@ def test_the_trellis_is_given_no_more_than_frames_bear_out():
     assert state.scatter[1] == 12
     plain = follow(doubled, PathFilter(matcher, start))[0]
     assert np.trace(plain.covariances[-1][:2, :2]) < 0.5 * np.trace(one.covariances[-1][:2, :2])
+
+
+def test_the_window_believes_matches_no_more_than_they_scatter():
+    """Over array frames the variance of the position is larger, by less than matches scatter as odometry tells, too."""
+    run = simulate(arc(Conditions(duration=12, snr=6.0, frames="array")), 68)
+    matcher, start = Matcher(GRID, frame_model(run.conditions)), Gaussian(mean=run.poses[0], covariance=START)
+    traces = []
+    for window in (Window(), Window(scatter=True)):
+        track, estimator = follow(run, WindowFilter(matcher, start, window=window))
+        traces.append(np.trace(track.covariances[-1][:2, :2]))
+    state = estimator.nodes[-1].state
+    assert state is not None
+    factor = _scatter(state.frames, np.nan)
+    assert factor > 1.5
+    assert 1.2 < traces[1] / traces[0] < factor
