@@ -48,13 +48,11 @@ seen = {
     "ray-cast: rocks on a rough floor": floor.frames[0].intensity,
 }
 figure, panels = plt.subplots(1, 3, figsize=(13.0, 3.6), layout="constrained")
-half = 0.5 * GRID.shape[1] * GRID.cell
-for axes, (title, image) in zip(panels, seen.items(), strict=True):
-    image = np.where(image == 0.0, np.nan, image)
+for axes, (title, image), grid in zip(panels, seen.items(), (GRID, GRID, floor.grid), strict=True):
+    image, (ahead, across) = np.where(image == 0.0, np.nan, image), np.multiply(grid.shape, grid.cell)
     low, high = np.nanpercentile(image, (2.0, 99.5))
-    axes.imshow(
-        image, origin="lower", extent=(-half, half, 0.0, GRID.shape[0] * GRID.cell), cmap="magma", vmin=low, vmax=high
-    )
+    extent = (-0.5 * across, 0.5 * across, 0.0, ahead)
+    axes.imshow(image, origin="lower", extent=extent, cmap="magma", vmin=low, vmax=high)
     axes.set(title=title, xlabel="to starboard [m]", ylabel="ahead [m]")
 
 # %% [markdown]

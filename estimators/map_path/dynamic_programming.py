@@ -13,8 +13,10 @@ from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Verdic
 from estimators.map_path import poses
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
-from estimators.map_path.matching import LEAST_CELLS, NO_OVERLAP
+from estimators.map_path.matching import LEAST_CELLS, NO_OVERLAP, Search, scatter_at
 from estimators.map_path.trellis import ErrorLattice, advance, mix
+
+REMEMBERED = 12  # matches over which their scatter is averaged
 
 
 class Step(NamedTuple):
@@ -47,6 +49,7 @@ class PathState(NamedTuple):
     step: Step | None = None  # the last one; None before the second frame
     outliers: int = 0
     verdicts: Verdicts = ()
+    scatter: tuple[float, int] = (0.0, 0)  # mean logarithm of the matches' scatter of late, and matches so far
 
     @property
     def belief(self) -> Gaussian:
@@ -85,6 +88,8 @@ class PathFilter:
         lattice: The errors of odometry.
         flat: Whether errors of different intervals are taken as independent: each frame is then judged by itself.
         saturation: Value at which the receiver saturates.
+        scatter: Whether the log-likelihood is divided by how far matches are found to scatter beyond it, see
+            `matching.score_covariance`; it is never multiplied.
     """
 
     def __init__(
@@ -95,8 +100,9 @@ class PathFilter:
         lattice: ErrorLattice | None = None,
         flat: bool = False,
         saturation: float = np.inf,
+        scatter: bool = False,
     ) -> None:
-        self.matcher, self.lattice = matcher, lattice or ErrorLattice()
+        self.matcher, self.lattice, self._scatter = matcher, lattice or ErrorLattice(), scatter
         self._start, self._flat, self._saturation = start, flat, saturation
 
     def start(self, nodes: Sequence[Node[PathState]], index: int) -> PathState:
@@ -134,6 +140,10 @@ class PathFilter:
         log_likelihood, reason = np.zeros(len(errors)), NO_OVERLAP
         if np.count_nonzero(cells) >= LEAST_CELLS:
             log_likelihood, reason = self.matcher.log_likelihood(frame, earlier, increments, cells), ""
+            if self._scatter:
+                best = increments[int(np.argmax(log_likelihood))]
+                state = _learnt(state, scatter_at(self.matcher, frame, earlier, best, cells, Search()))
+                log_likelihood = log_likelihood * np.exp(-max(state.scatter[0], 0.0))
         first, second = self.lattice.transitions(sum(u.duration for u in state.motion))
         transitions = (np.zeros_like(first), np.zeros_like(second)) if self._flat else (first, second)
         scores, came_from = advance(state.scores, log_likelihood, transitions)
@@ -153,6 +163,15 @@ class PathFilter:
         spread = along**2 / 12.0 * np.einsum("ki,kj->kij", direction, direction)
         spread[:, 2, 2] += turn**2 / 12.0
         return spread
+
+
+def _learnt(state: PathState, scatter: float) -> PathState:
+    """State with the scatter of one more match, if it is known."""
+    mean, count = state.scatter
+    if not scatter > 0.0:
+        return state
+    mean += (np.log(scatter) - mean) / min(count + 1, REMEMBERED)
+    return state._replace(scatter=(mean, count + 1))
 
 
 def _mixed(moments: Moments, log_likelihood: Array, transitions: tuple[Array, Array]) -> Moments:

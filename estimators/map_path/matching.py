@@ -80,9 +80,24 @@ def match(
     factor = np.nan
     if scatter:
         chosen = [(earlier[k], relatives[k], cells[k]) for k in used]
-        score = score_covariance(matcher, later, chosen, best, np.array(search.fine))
-        factor = float(np.linalg.det(np.linalg.solve(curvature, score)) ** (1.0 / 3.0))
+        factor = _scatter(curvature, score_covariance(matcher, later, chosen, best, np.array(search.fine)))
     return Match(peak, np.asarray(np.linalg.inv(curvature), dtype=np.float64), float(value), weights, factor)
+
+
+def scatter_at(
+    matcher: Matcher, later: Prepared, earlier: Prepared, relative: Array, cells: np.ndarray, search: Search
+) -> float:
+    """The scatter of a match with one earlier frame at a relative pose (3,) near its peak; NaN if there is none."""
+    spacing = np.array(search.fine)
+    values = matcher.log_likelihood(later, earlier, compose(relative, POINTS * spacing), cells)
+    curvature = quadratic(values, spacing)[2]
+    if np.linalg.eigvalsh(curvature)[0] <= 0.0:
+        return np.nan
+    return _scatter(curvature, score_covariance(matcher, later, [(earlier, relative, cells)], np.zeros(3), spacing))
+
+
+def _scatter(curvature: Array, score: Array) -> float:
+    return float(np.linalg.det(np.linalg.solve(curvature, score)) ** (1.0 / 3.0))
 
 
 def score_covariance(

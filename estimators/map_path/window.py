@@ -17,7 +17,7 @@ from estimators.core.types import NO_MODEL, Array, Gaussian, Measurement, Models
 from estimators.map_path.frames import KIND, fault
 from estimators.map_path.likelihood import Matcher, Prepared
 from estimators.map_path.matching import NO_OVERLAP, Search, match
-from estimators.map_path.odometry import OdometryNoise
+from estimators.map_path.odometry import RELIEF, OdometryNoise
 from estimators.map_path.poses import between, between_jacobians
 
 NIS_GATE = 0.9999  # a match outside is refused
@@ -33,7 +33,9 @@ class Window:
     interval: int = 1  # frames from one that is matched to the next
     covariance_factor: float = 1.0  # of a match, for what the frames' model leaves out: relief, errors that last
     scatter: bool = False  # whether that is learnt from the frames beside it, see `matching.score_covariance`
-    relief: float = 0.0  # relative error of distances between frames, along and across, deviation; states unless 0 [-]
+    relief: float = (
+        0.0  # deviation of relative errors of distances between frames; unless 0, `odometry.RELIEF` are states
+    )
     relief_time: float = np.inf  # time constant with which those decay [s]
 
 
@@ -84,7 +86,6 @@ class WindowFilter:
         self._start, self._window, self._search = noise.start(start, window.relief), window, search or Search()
         model = replace(matcher.model, together=len(window.lags))
         self.matcher, self.process = Matcher(matcher.grid, model), noise.process(window.relief, window.relief_time)
-        self._relief = slice(5, 8) if window.relief else None  # which of the states
         self.sensors: Models = {}
         self._saturation = saturation
 
@@ -116,6 +117,14 @@ class WindowFilter:
         """For `smoothing`."""
         return self.process
 
+    def _relief(self) -> slice | None:
+        """Which of the process' states are `odometry.RELIEF`; None if it has none of them."""
+        space = getattr(self.process, "space", None)
+        if space is None or RELIEF[0] not in space.names:
+            return None
+        first = space.index(RELIEF[0])
+        return slice(first, first + len(RELIEF))
+
     def _placed(self, state: WindowState, frame: Prepared) -> tuple[WindowState, str, float, float]:
         """State with a frame matched against the window, or why it was not, the match's NIS and how it scatters."""
         chosen = [len(state.frames) - lag for lag in self._window.lags if lag <= len(state.frames)]
@@ -124,15 +133,15 @@ class WindowFilter:
         earlier = [state.frames[k] for k in chosen]
         relation = Relation.of_pose(state.whole, state.size, [state.size + 3 * k for k in chosen])
         prior = relation.covariance(0) + 1e-8 * np.eye(3)
-        relatives = relation.relatives
-        if self._relief is not None:
-            relatives = relatives + relation.by_relief() @ state.whole.mean[self._relief]
+        relatives, relief = relation.relatives, self._relief()
+        if relief is not None:
+            relatives = relatives + relation.by_relief() @ state.whole.mean[relief]
         found = match(self.matcher, frame, earlier, relatives, prior, self._search, self._window.scatter)
         if isinstance(found, str):
             return state, found, np.nan, np.nan
         H = relation.jacobian(found.weights)
-        if self._relief is not None:
-            H[:, self._relief] = np.tensordot(found.weights, relation.by_relief(later_axes=True), 1)
+        if relief is not None:
+            H[:, relief] = np.tensordot(found.weights, relation.by_relief(later_axes=True), 1)
         limit = chi_square(NIS_GATE, 3)
         R = self._window.covariance_factor * _scatter(state.frames, found.scatter) * found.covariance
         whole, innovation = ekf.correct_linear(state.whole, H, found.offset, R, limit)

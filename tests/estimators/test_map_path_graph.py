@@ -204,7 +204,7 @@ def test_closures_hold_a_racetrack_together():
     matcher = Matcher(GRID, frame_model(run.conditions))
     track, _ = follow(run, WindowFilter(matcher, Gaussian(mean=run.poses[0], covariance=START)))
     ready = [matcher.prepare(f.intensity) for f in run.frames]
-    settings = pose_graph.GraphSettings(closure_spacing=4, lags=(1, 4), rounds=0)
+    settings = pose_graph.GraphSettings(closure_spacing=8, lags=(1, 4), rounds=0)
     closed = pose_graph.solve(matcher, ready, track.poses, START, settings=settings)
     assert len(closed.closures) >= 4
     open_ = pose_graph.solve(matcher, ready, track.poses, START, settings=settings, close_loops=False)

@@ -10,6 +10,7 @@ from auvsim.reproduce.paper5.methods import START, follow, frame_model
 from auvsim.reproduce.paper5.scenes import GRID, Conditions, arc, point_frame, simulate
 from estimators.core.types import Gaussian
 from estimators.map_path import poses
+from estimators.map_path.dynamic_programming import PathFilter
 from estimators.map_path.frames import SectorGrid, SonarFrame
 from estimators.map_path.likelihood import FrameModel, Matcher, Prepared
 from estimators.map_path.matching import Match, Search, match, score_covariance
@@ -162,3 +163,34 @@ def test_the_window_learns_a_scale_of_frames_from_good_odometry():
     assert belief.mean[5] == pytest.approx(scale, abs=3.0 * deviation)
     assert deviation < 0.015
     assert track.poses[-1, 0] == pytest.approx(1.5 * 19, abs=3.0 * math.sqrt(belief.covariance[0, 0]))
+
+
+def test_the_trellis_is_given_no_more_than_frames_bear_out():
+    """In another unit the path and its covariance stay the same, of frames that scatter; in the likelihood's eyes four
+    times as much is known, which without `scatter` it believes."""
+    run = simulate(arc(Conditions(duration=12, snr=6.0, frames="array")), 67)
+    matcher, start = Matcher(GRID, frame_model(run.conditions)), Gaussian(mean=run.poses[0], covariance=START)
+    doubled = replace(run, frames=tuple(replace(f, intensity=2.0 * f.intensity) for f in run.frames))
+    (one, _), (two, estimator) = (follow(r, PathFilter(matcher, start, scatter=True)) for r in (run, doubled))
+    np.testing.assert_allclose(two.poses, one.poses, atol=1e-9)
+    np.testing.assert_allclose(two.covariances, one.covariances, rtol=1e-6)
+    state = estimator.nodes[-1].state
+    assert state is not None
+    assert state.scatter[1] == 12
+    plain = follow(doubled, PathFilter(matcher, start))[0]
+    assert np.trace(plain.covariances[-1][:2, :2]) < 0.5 * np.trace(one.covariances[-1][:2, :2])
+
+
+def test_the_window_believes_matches_no_more_than_they_scatter():
+    """Over array frames the variance of the position is larger, by less than matches scatter as odometry tells, too."""
+    run = simulate(arc(Conditions(duration=12, snr=6.0, frames="array")), 68)
+    matcher, start = Matcher(GRID, frame_model(run.conditions)), Gaussian(mean=run.poses[0], covariance=START)
+    traces = []
+    for window in (Window(), Window(scatter=True)):
+        track, estimator = follow(run, WindowFilter(matcher, start, window=window))
+        traces.append(np.trace(track.covariances[-1][:2, :2]))
+    state = estimator.nodes[-1].state
+    assert state is not None
+    factor = _scatter(state.frames, np.nan)
+    assert factor > 1.5
+    assert 1.2 < traces[1] / traces[0] < factor

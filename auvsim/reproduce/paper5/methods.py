@@ -94,8 +94,9 @@ def dead_reckoning(run: Run) -> Track:
 
 def path(run: Run, weighting: Weighting = "field", flat: bool = False) -> Track:
     """Dynamic programming; the path is what it is at the end, the covariance what it was on the way."""
-    matcher = _matcher(run, weighting)
-    track, estimator = follow(run, PathFilter(matcher, _start(run), flat=flat, saturation=SATURATION))
+    matcher, scatter = _matcher(run, weighting), weighting == "field" and not flat
+    filter_ = PathFilter(matcher, _start(run), flat=flat, saturation=SATURATION, scatter=scatter)
+    track, estimator = follow(run, filter_)
     state = estimator.nodes[-1].state
     assert state is not None
     poses = track.poses.copy()
