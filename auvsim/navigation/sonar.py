@@ -30,11 +30,12 @@ from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
 from estimators.docking.aids import WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
-from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
+from estimators.map_path.keyframes import MARK, FrameErrors, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
 from estimators.map_path.window import Window
 
 SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
+NEARER, STRETCH = "echoes_nearer", "frame_stretch"  # what frames err by, see `FrameErrors`; the first beyond its setting
 GPS = "gps"  # kind of measurement whose slow error is in the state
 GPS_ERRORS = ("gps_north", "gps_east")  # that slow error
 ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
@@ -42,6 +43,7 @@ SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
 WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
 KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
+STRETCHED = 0.003  # deviation of what frames show of a motion, by that motion: 5 cm of altitude are 0.2 %
 SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
@@ -88,6 +90,7 @@ class SonarNavigator(ReckoningNavigator):
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
         self._positions = {*of_kind(setup.sensors, GpsSettings), *of_kind(setup.sensors, FixSettings)}
         dvls = of_kind(setup.sensors, DvlSettings)
+        self._nearer_error = max(setup.settings.nearer_error, 1e-6)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
         self._gps: GpsSettings | None = next(iter(of_kind(setup.sensors, GpsSettings).values()), None)
@@ -97,6 +100,7 @@ class SonarNavigator(ReckoningNavigator):
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
         positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
+        motion = with_error(with_error(motion, NEARER, "m"), STRETCH, "1")
         if self._gps is not None:
             for name in GPS_ERRORS:
                 motion = with_error(motion, name, "m", time_constant=self._gps.wander_time)
@@ -121,6 +125,7 @@ class SonarNavigator(ReckoningNavigator):
             gates=dict.fromkeys(models, 0.9999),
             window=WINDOW,
             keyframes=keyframes,
+            errors=FrameErrors(nearer=motion.space.index(NEARER), stretch=motion.space.index(STRETCH)),
         )
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
@@ -134,7 +139,7 @@ class SonarNavigator(ReckoningNavigator):
 
     def _known(self) -> dict[str, float]:
         wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
-        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), **wander}
+        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), NEARER: self._nearer_error, STRETCH: STRETCHED, **wander}
 
     def _beginning(self) -> Start:
         """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""
