@@ -15,6 +15,7 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.measurements import FIX, averaged, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.rate_mean import RateMean
 from auvsim.navigation.reckoning import ReckoningNavigator, Start
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.sensors.altimeter import AltimeterSettings
@@ -28,7 +29,7 @@ from estimators.core.models import sensors
 from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
-from estimators.docking.aids import WATER
+from estimators.docking.aids import GYRO, WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import MARK, FrameErrors, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
@@ -36,6 +37,7 @@ from estimators.map_path.window import Window
 
 SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
 NEARER, STRETCH = "echoes_nearer", "frame_stretch"  # what frames err by, see `FrameErrors`; the first beyond its setting
+TURN_RATE = "turn_rate"  # input
 GPS = "gps"  # kind of measurement whose slow error is in the state
 GPS_ERRORS = ("gps_north", "gps_east")  # that slow error
 ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
@@ -94,11 +96,16 @@ class SonarNavigator(ReckoningNavigator):
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
         self._gps: GpsSettings | None = next(iter(of_kind(setup.sensors, GpsSettings).values()), None)
+        self._gyro = next(iter(of_kind(setup.sensors, GyroSettings)), None)
         super().__init__(setup)
 
     def _motion(self) -> Motion:
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
-        positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
+        positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known.
+
+        The heading turns as the gyro says, all of its readings: by a yaw rate that is known at each update only, it
+        would be lost by half a degree from one to the next. The yaw rate is then a state by the way.
+        """
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
         motion = with_error(with_error(motion, NEARER, "m"), STRETCH, "1")
         if self._gps is not None:
@@ -108,14 +115,17 @@ class SonarNavigator(ReckoningNavigator):
         def rates(x: Symbols, u: Symbols) -> Symbols:
             c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
             true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
-            return motion.rates({**x, **true}, u)
+            found = motion.rates({**x, **true}, u)
+            return {**found, "heading": u[TURN_RATE] - x["gyro_bias"]} if self._gyro else found
 
-        return replace(motion, rates=rates)
+        return replace(motion, rates=rates, inputs=(TURN_RATE,) if self._gyro else ())
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
         if self._gps is not None:
             models = {**models, GPS: sensors.fix(motion, bias=GPS_ERRORS)}
+        if self._gyro:
+            models = {**models, GYRO: sensors.gyro(motion)}
         keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
         filter_ = KeyframeFilter(
             self._matcher,
@@ -129,6 +139,15 @@ class SonarNavigator(ReckoningNavigator):
         )
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
+
+    def _input_noise(self, setup: NavigatorSetup) -> dict[str, float]:
+        """Power spectral densities of the noise of the motion's inputs, by input [unit2 s]."""
+        gyros = of_kind(setup.sensors, GyroSettings)
+        return {TURN_RATE: math.radians(gyros[self._gyro].noise_density_deg) ** 2} if self._gyro else {}
+
+    def _inputs(self, time: float) -> tuple[float, ...]:
+        """The mean turn rate since the last update."""
+        return (self._turning.mean(time),) if self._gyro else ()
 
     def _walks(self, setup: NavigatorSetup) -> dict[str, float]:
         walks = super()._walks(setup)
@@ -149,6 +168,7 @@ class SonarNavigator(ReckoningNavigator):
         """Forgets everything."""
         super().reset()
         self._altitude = self._floor = math.nan
+        self._turning = RateMean()
         self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
         self._fixed: float | None = None  # when there was a fix last [s]
         self._counts: dict[int, int] = {}  # readings in each mean since the last update, by its id
@@ -166,6 +186,10 @@ class SonarNavigator(ReckoningNavigator):
                 self._hear(reading)
         fixes = [reading for reading in plain if reading.sensor == "usbl"]
         means = []
+        for reading in plain:
+            if reading.sensor == self._gyro:
+                for measurement in super()._measured(reading):
+                    self._turning.add(reading.stamp, float(measurement.value[0]))
         self._counts.clear()
         for reading, count in averaged([r for r in plain if r not in fixes]):
             means.append(reading._replace(stamp=round(reading.stamp, 6)))
