@@ -198,6 +198,7 @@ class Start:
     known: Mapping[str, float]  # deviations of the other states
     doubt: float  # deviation of a first fix that may be an outlier [m]
     slow: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # states that are errors of a position, by kind
+    means: Mapping[str, float] = field(default_factory=dict)  # of states that are not expected to be 0
 
     def __call__(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
         """The belief and the measurements that it is made of; None where those of the node do not suffice."""
@@ -212,7 +213,7 @@ class Start:
             "east": self.deviation,
             **self.known,
         }
-        belief = self.space.belief({"heading": float(earlier[-1].value[0])}, known)
+        belief = self.space.belief({"heading": float(earlier[-1].value[0]), **self.means}, known)
         mean, covariance = belief.mean, belief.covariance
         psi, bias = self.space.index("heading"), self.space.index("compass_bias")
         covariance[psi, bias] = covariance[bias, psi] = -(

@@ -33,10 +33,11 @@ from estimators.docking.aids import GYRO, WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import MARK, FrameErrors, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
+from estimators.map_path.odometry import ARM, RELIEF
 from estimators.map_path.window import Window
 
 SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
-NEARER, STRETCH = "echoes_nearer", "frame_stretch"  # what frames err by, see `FrameErrors`; the first beyond its setting
+NEARER = "echoes_nearer"  # distance by which echoes come from before what they are of, beyond its setting [m]
 TURN_RATE = "turn_rate"  # input
 GPS = "gps"  # kind of measurement whose slow error is in the state
 GPS_ERRORS = ("gps_north", "gps_east")  # that slow error
@@ -45,7 +46,8 @@ SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
 WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
 KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
-STRETCHED = 0.003  # deviation of what frames show of a motion, by that motion: 5 cm of altitude are 0.2 %
+DISTANCES = 0.003  # deviation of distances between frames, by those: 5 cm of altitude are 0.2 %
+ALIKE = 0.6  # share of the distance by which echoes come from before, that frames of alike headings show
 SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
@@ -84,7 +86,7 @@ class SonarNavigator(ReckoningNavigator):
             half_sector=half,
             ahead=settings.nose,
         )
-        self._frames = SectorFrames(polar=polar, grid=grid, nearer=setup.settings.nearer)
+        self._frames = SectorFrames(polar=polar, grid=grid, nearer=ALIKE * setup.settings.nearer)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
         model = FrameModel(
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)
@@ -92,6 +94,7 @@ class SonarNavigator(ReckoningNavigator):
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
         self._positions = {*of_kind(setup.sensors, GpsSettings), *of_kind(setup.sensors, FixSettings)}
         dvls = of_kind(setup.sensors, DvlSettings)
+        self._nearer = setup.settings.nearer
         self._nearer_error = max(setup.settings.nearer_error, 1e-6)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
@@ -107,7 +110,8 @@ class SonarNavigator(ReckoningNavigator):
         would be lost by half a degree from one to the next. The yaw rate is then a state by the way.
         """
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
-        motion = with_error(with_error(motion, NEARER, "m"), STRETCH, "1")
+        for name, unit in {NEARER: "m", **dict.fromkeys(RELIEF, "1")}.items():
+            motion = with_error(motion, name, unit)
         if self._gps is not None:
             for name in GPS_ERRORS:
                 motion = with_error(motion, name, "m", time_constant=self._gps.wander_time)
@@ -127,6 +131,7 @@ class SonarNavigator(ReckoningNavigator):
         if self._gyro:
             models = {**models, GYRO: sensors.gyro(motion)}
         keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
+        index = motion.space.index
         filter_ = KeyframeFilter(
             self._matcher,
             process,
@@ -135,7 +140,7 @@ class SonarNavigator(ReckoningNavigator):
             gates=dict.fromkeys(models, 0.9999),
             window=WINDOW,
             keyframes=keyframes,
-            errors=FrameErrors(nearer=motion.space.index(NEARER), stretch=motion.space.index(STRETCH)),
+            errors=FrameErrors(nearer=index(NEARER), relief=(index(RELIEF[0]), index(RELIEF[1]), index(RELIEF[2]))),
         )
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
@@ -158,11 +163,16 @@ class SonarNavigator(ReckoningNavigator):
 
     def _known(self) -> dict[str, float]:
         wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
-        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), NEARER: self._nearer_error, STRETCH: STRETCHED, **wander}
+        relief = dict(zip(RELIEF, (DISTANCES, DISTANCES, DISTANCES / ARM), strict=True))
+        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), NEARER: self._nearer_error, **relief, **wander}
 
     def _beginning(self) -> Start:
         """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""
-        return replace(super()._beginning(), slow={} if self._gps is None else {GPS: GPS_ERRORS})
+        return replace(
+            super()._beginning(),
+            slow={} if self._gps is None else {GPS: GPS_ERRORS},
+            means={NEARER: (1.0 - ALIKE) * self._nearer},
+        )
 
     def reset(self) -> None:
         """Forgets everything."""
