@@ -108,7 +108,7 @@ class SonarSettings(ReckoningSettings):
     match: bool = Field(default=True, description="whether frames are matched; without, it is dead reckoning")
     closures: bool = Field(default=True, description="whether loops are closed between lanes")
     stride: int = Field(
-        default=4, ge=1, le=1000, description="frames from one that is matched to the next; a DVL knows the rest better"
+        default=2, ge=1, le=1000, description="frames from one that is matched to the next; a DVL knows the rest better"
     )
     keyframes: int = Field(
         default=2, ge=1, le=1000, description="matched frames from one that is kept for closures to the next"

@@ -45,7 +45,7 @@ ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to 
 SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
 WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
-KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
+KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0, other_factor=50.0)
 DISTANCES = 0.003  # deviation of distances between frames, by those: 5 cm of altitude are 0.2 %
 ALIKE = 0.6  # share of the distance by which echoes come from before, that frames of alike headings show
 SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
