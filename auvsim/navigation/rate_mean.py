@@ -1,6 +1,7 @@
 """The mean of a sampled rate over the time from one update to the next: an input of a filter."""
 
 import math
+from itertools import pairwise
 
 
 class RateMean:
@@ -16,7 +17,7 @@ class RateMean:
             self._readings.append((stamp, rate))
 
     def mean(self, time: float) -> float:
-        """Mean since the last time it was asked for [unit]; held before the first reading and after the last, 0 of none.
+        """Mean since the last time it was asked for; held before the first reading and after the last, 0 without any.
 
         Args:
             time: Now [s], later than the last time.
@@ -37,7 +38,7 @@ class RateMean:
     def _at(self, time: float) -> float:
         """The rate at a time: between its readings, or that of the nearest."""
         readings = self._readings
-        for (first, rate), (second, following) in zip(readings, readings[1:], strict=False):
+        for (first, rate), (second, following) in pairwise(readings):
             if first <= time <= second:
                 return rate + (following - rate) * (time - first) / (second - first)
         return readings[0][1] if time < readings[0][0] else readings[-1][1]

@@ -114,7 +114,10 @@ class SonarSettings(ReckoningSettings):
         default=2, ge=1, le=1000, description="matched frames from one that is kept for closures to the next"
     )
     nearer: float = Field(
-        default=0.4, ge=0, le=5, description="by which echoes come from before what they are of, along the level [m]"
+        default=0.4,
+        ge=0,
+        le=5,
+        description="by which echoes come from before what they are of: near sides of rocks and slopes [m]",
     )
     nearer_error: float = Field(default=0.1, ge=0, le=5, description="standard deviation of that, learnt [m]")
     keep: float = Field(default=10.0, gt=0, description="age up to which measurements are used [s]")

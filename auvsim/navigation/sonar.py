@@ -31,7 +31,7 @@ from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
 from estimators.docking.aids import GYRO, WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
-from estimators.map_path.keyframes import MARK, FrameErrors, KeyframeFilter, Keyframes, KeyframeState
+from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
 from estimators.map_path.odometry import ARM, RELIEF
 from estimators.map_path.window import Window
@@ -110,6 +110,7 @@ class SonarNavigator(ReckoningNavigator):
         would be lost by half a degree from one to the next. The yaw rate is then a state by the way.
         """
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
+        turned = self._gyro is not None  # the function below shall not hold the navigator
         for name, unit in {NEARER: "m", **dict.fromkeys(RELIEF, "1")}.items():
             motion = with_error(motion, name, unit)
         if self._gps is not None:
@@ -120,9 +121,9 @@ class SonarNavigator(ReckoningNavigator):
             c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
             true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
             found = motion.rates({**x, **true}, u)
-            return {**found, "heading": u[TURN_RATE] - x["gyro_bias"]} if self._gyro else found
+            return {**found, "heading": u[TURN_RATE] - x["gyro_bias"]} if turned else found
 
-        return replace(motion, rates=rates, inputs=(TURN_RATE,) if self._gyro else ())
+        return replace(motion, rates=rates, inputs=(TURN_RATE,) if turned else ())
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
@@ -131,7 +132,6 @@ class SonarNavigator(ReckoningNavigator):
         if self._gyro:
             models = {**models, GYRO: sensors.gyro(motion)}
         keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
-        index = motion.space.index
         filter_ = KeyframeFilter(
             self._matcher,
             process,
@@ -140,7 +140,7 @@ class SonarNavigator(ReckoningNavigator):
             gates=dict.fromkeys(models, 0.9999),
             window=WINDOW,
             keyframes=keyframes,
-            errors=FrameErrors(nearer=index(NEARER), relief=(index(RELIEF[0]), index(RELIEF[1]), index(RELIEF[2]))),
+            nearer=motion.space.index(NEARER),
         )
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
@@ -164,7 +164,14 @@ class SonarNavigator(ReckoningNavigator):
     def _known(self) -> dict[str, float]:
         wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
         relief = dict(zip(RELIEF, (DISTANCES, DISTANCES, DISTANCES / ARM), strict=True))
-        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), NEARER: self._nearer_error, **relief, **wander}
+        return {
+            **super()._known(),
+            SCALE: max(self._scale, 1e-6),
+            MOUNTING: max(self._mounting, 1e-6),
+            NEARER: self._nearer_error,
+            **relief,
+            **wander,
+        }
 
     def _beginning(self) -> Start:
         """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""

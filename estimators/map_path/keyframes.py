@@ -56,13 +56,6 @@ class Keyframes:
     other_factor: float = 25.0  # the same where headings are not alike
 
 
-class FrameErrors(NamedTuple):
-    """Which of the vehicle's states are errors of the frames themselves; None: none is."""
-
-    nearer: int | None = None  # distance by which echoes come from before what they are of [m]
-    relief: tuple[int, int, int] | None = None  # relative errors of distances between them, see `odometry.RELIEF`
-
-
 class Closure(NamedTuple):
     """A match with keyframes that is not yet believed."""
 
@@ -118,7 +111,7 @@ class KeyframeFilter(WindowFilter):
         window: Which of the last frames to match against.
         search: Which poses to try for that.
         keyframes: What is kept beyond the window; None: nothing, and no loop is closed.
-        errors: Which states are errors of the frames themselves.
+        nearer: Which state is the distance by which echoes come from before what they are of [m]; None: none is.
         saturation: Value at which the receiver saturates.
     """
 
@@ -133,7 +126,7 @@ class KeyframeFilter(WindowFilter):
         window: Window | None = None,
         search: Search | None = None,
         keyframes: Keyframes | None = None,
-        errors: "FrameErrors | None" = None,
+        nearer: int | None = None,
         saturation: float = np.inf,
     ) -> None:
         nowhere = Gaussian(mean=np.zeros(3), covariance=np.eye(3))
@@ -141,8 +134,7 @@ class KeyframeFilter(WindowFilter):
         self._keyframes = keyframes or Keyframes(closures=False, spacing=0)
         self._closing = Matcher(matcher.grid, replace(matcher.model, together=self._keyframes.support))
         self.process, self.sensors = process, sensors  # pyright: ignore[reportIncompatibleVariableOverride]
-        self._begin, self._gates, self._errors = start, gates or {}, errors or FrameErrors()
-        self._relief = None if self._errors.relief is None else list(self._errors.relief)
+        self._begin, self._gates, self._nearer = start, gates or {}, nearer
 
     def start(self, nodes: Sequence[Node[KeyframeState]], index: int) -> KeyframeState | None:  # pyright: ignore
         """State at the first node that suffices."""
@@ -288,16 +280,18 @@ class KeyframeFilter(WindowFilter):
         places = [n + 3 * k for k in earlier]
         relation = Relation.of_pose(state.whole, n, places, state.place(latest))
         prior = relation.covariance(0) + np.diag(np.square(settings.search_prior))
-        if self._errors.nearer is not None:
-            moved = _by_nearer(relation)[0]
-            prior[:2, :2] += np.outer(moved, moved) * state.whole.covariance[self._errors.nearer, self._errors.nearer]
+        expected, nearer = relation.relatives, self._nearer
+        if nearer is not None:
+            moved = np.pad(_by_nearer(relation), ((0, 0), (0, 1)))
+            expected = compose(expected, moved * state.whole.mean[nearer])
+            prior += np.outer(moved[0], moved[0]) * state.whole.covariance[nearer, nearer]
         frames = [state.frames[k] for k in earlier]
-        found = match(self._closing, state.frames[-1], frames, relation.relatives, prior, settings.search)
+        found = match(self._closing, state.frames[-1], frames, expected, prior, settings.search)
         if isinstance(found, str) or found.log_likelihood < settings.ratio:
             return None
         if (np.abs(found.offset) > settings.search.limits).any():
             return None
-        measured = compose(relation.relatives, found.offset)
+        measured = compose(expected, found.offset)
         numbers = tuple(state.numbers[k] for k in earlier)
         return Closure(latest, numbers, measured, found.weights, factor * found.covariance)
 
@@ -305,10 +299,11 @@ class KeyframeFilter(WindowFilter):
         """Derivative (3, n + 3 k) and residual (3,) of a closure in the present state."""
         places = [state.place(number) for number in closure.earlier]
         relation = Relation.of_pose(state.whole, state.size, places, state.place(closure.later))
-        H, residual = relation.jacobian(closure.weights), closure.weights @ between(relation.relatives, closure.measured)
-        if self._errors.nearer is not None:
-            H[:2, self._errors.nearer] = closure.weights @ _by_nearer(relation)
-            residual[:2] -= H[:2, self._errors.nearer] * state.whole.mean[self._errors.nearer]
+        H = relation.jacobian(closure.weights)
+        residual = closure.weights @ between(relation.relatives, closure.measured)
+        if self._nearer is not None:
+            H[:2, self._nearer] = closure.weights @ _by_nearer(relation)
+            residual[:2] -= H[:2, self._nearer] * state.whole.mean[self._nearer]
         return H, residual
 
     def _agreeing(self, state: KeyframeState, pending: Sequence[Closure]) -> list[int]:
