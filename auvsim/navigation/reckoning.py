@@ -69,6 +69,7 @@ class ReckoningNavigator(OverHistory):
                 "yaw_rate": s.yaw_acceleration,
                 **self._walks(setup),
             },
+            input_noise=self._input_noise(setup),
         )
         models = {
             COMPASS: sensors.compass(motion, bias="compass_bias"),
@@ -91,6 +92,10 @@ class ReckoningNavigator(OverHistory):
         """Process noise of the sensors' errors, by state [unit2/s]."""
         return {"gyro_bias": GYRO_WALK}
 
+    def _input_noise(self, setup: NavigatorSetup) -> dict[str, float]:
+        """Power spectral densities of the noise of the motion's inputs, by input [unit2 s]."""
+        return {}
+
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         """The filter behind its delay buffer."""
         return Estimator(ModelFilter(process, models, self._beginning(), gates=0.9999), step=setup.period)
@@ -105,6 +110,10 @@ class ReckoningNavigator(OverHistory):
     def _more(self) -> list[Measurement]:
         """What else there is to tell since the last update."""
         return []
+
+    def _inputs(self, time: float) -> tuple[float, ...]:
+        """Inputs of the motion since the last update."""
+        return ()
 
     def _measured(self, reading: Reading) -> Iterable[Measurement]:
         """What a reading says of the horizontal motion."""
@@ -128,7 +137,7 @@ class ReckoningNavigator(OverHistory):
                 found.append(self._fix(reading))
             elif reading.sensor in self._sensors:
                 found += self._measured(reading)
-        result = self._estimator.tick(time, (), [*found, *self._more()])
+        result = self._estimator.tick(time, self._inputs(time), [*found, *self._more()])
         n = len(self._space)
         belief = result.belief or Gaussian(mean=np.zeros(n), covariance=np.zeros((n, n)))
         # Copied: it may be a part of the state with all frames' poses, which a log would then hold at every tick.
@@ -189,6 +198,7 @@ class Start:
     known: Mapping[str, float]  # deviations of the other states
     doubt: float  # deviation of a first fix that may be an outlier [m]
     slow: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # states that are errors of a position, by kind
+    means: Mapping[str, float] = field(default_factory=dict)  # of states that are not expected to be 0
 
     def __call__(self, nodes: Sequence[Node], index: int) -> tuple[Gaussian, list[Measurement]] | None:
         """The belief and the measurements that it is made of; None where those of the node do not suffice."""
@@ -203,7 +213,7 @@ class Start:
             "east": self.deviation,
             **self.known,
         }
-        belief = self.space.belief({"heading": float(earlier[-1].value[0])}, known)
+        belief = self.space.belief({"heading": float(earlier[-1].value[0]), **self.means}, known)
         mean, covariance = belief.mean, belief.covariance
         psi, bias = self.space.index("heading"), self.space.index("compass_bias")
         covariance[psi, bias] = covariance[bias, psi] = -(

@@ -108,17 +108,18 @@ class SonarSettings(ReckoningSettings):
     match: bool = Field(default=True, description="whether frames are matched; without, it is dead reckoning")
     closures: bool = Field(default=True, description="whether loops are closed between lanes")
     stride: int = Field(
-        default=4, ge=1, le=1000, description="frames from one that is matched to the next; a DVL knows the rest better"
+        default=2, ge=1, le=1000, description="frames from one that is matched to the next; a DVL knows the rest better"
     )
     keyframes: int = Field(
         default=2, ge=1, le=1000, description="matched frames from one that is kept for closures to the next"
     )
     nearer: float = Field(
-        default=0.15,
+        default=0.4,
         ge=0,
         le=5,
-        description="by which echoes come from before the middle of rocks; 0 over a floor without any [m]",
+        description="by which echoes come from before what they are of: near sides of rocks and slopes [m]",
     )
+    nearer_error: float = Field(default=0.1, ge=0, le=5, description="standard deviation of that, learnt [m]")
     keep: float = Field(default=10.0, gt=0, description="age up to which measurements are used [s]")
 
 

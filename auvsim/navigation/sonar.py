@@ -15,6 +15,7 @@ from auvsim.base.reading import Reading
 from auvsim.navigation.estimate import Estimate
 from auvsim.navigation.measurements import FIX, averaged, of_kind
 from auvsim.navigation.navigator import Navigator, NavigatorSetup
+from auvsim.navigation.rate_mean import RateMean
 from auvsim.navigation.reckoning import ReckoningNavigator, Start
 from auvsim.navigation.sonar_frames import SectorFrames
 from auvsim.sensors.altimeter import AltimeterSettings
@@ -28,20 +29,25 @@ from estimators.core.models import sensors
 from estimators.core.models.motion import Motion, Symbols, with_error
 from estimators.core.models.process import MotionProcess
 from estimators.core.types import Measurement, Models
-from estimators.docking.aids import WATER
+from estimators.docking.aids import GYRO, WATER
 from estimators.map_path.frames import PolarGrid, SectorGrid
 from estimators.map_path.keyframes import MARK, KeyframeFilter, Keyframes, KeyframeState
 from estimators.map_path.likelihood import FrameModel, Matcher
+from estimators.map_path.odometry import ARM, RELIEF
 from estimators.map_path.window import Window
 
 SCALE, MOUNTING = "dvl_scale", "dvl_mounting"
+NEARER = "echoes_nearer"  # distance by which echoes come from before what they are of, beyond its setting [m]
+TURN_RATE = "turn_rate"  # input
 GPS = "gps"  # kind of measurement whose slow error is in the state
 GPS_ERRORS = ("gps_north", "gps_east")  # that slow error
 ROWS = 80  # of a frame's cells ahead; with half as many, cells drew matches to whole numbers of them
 SMOOTHING, PATIENCE = 30.0, 5.0  # time constant of the floor's mean depth; time without echo that begins it anew [s]
 POINT_SPREAD, FLOOR_SHARE = 0.2, 0.1  # of echoes [m]; of the floor in the variance of a standardised frame [-]
 WINDOW = Window(kept=4, lags=(1,), covariance_factor=6.0)
-KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0)
+KEYFRAMES = Keyframes(interval=1, gap=15, support=2, covariance_factor=25.0, other_factor=50.0)
+DISTANCES = 0.003  # deviation of distances between frames, by those: 5 cm of altitude are 0.2 %
+ALIKE = 0.6  # share of the distance by which echoes come from before, that frames of alike headings show
 SUBMERGED = 2.0  # time without a fix after which a dive has begun [s]
 HIGHEST = 0.5  # altitude by the sonar's maximum range above which a frame shows too little floor
 
@@ -80,7 +86,7 @@ class SonarNavigator(ReckoningNavigator):
             half_sector=half,
             ahead=settings.nose,
         )
-        self._frames = SectorFrames(polar=polar, grid=grid, nearer=setup.settings.nearer)
+        self._frames = SectorFrames(polar=polar, grid=grid, nearer=ALIKE * setup.settings.nearer)
         density = FLOOR_SHARE / (math.pi * POINT_SPREAD**2)  # of features whose images make that share of the variance
         model = FrameModel(
             density=density, amplitude=1.0, point_spread=POINT_SPREAD, noise=math.sqrt(1.0 - FLOOR_SHARE)
@@ -88,15 +94,25 @@ class SonarNavigator(ReckoningNavigator):
         self._matcher, self._highest = Matcher(grid, model), HIGHEST * float(ranges[-1])
         self._positions = {*of_kind(setup.sensors, GpsSettings), *of_kind(setup.sensors, FixSettings)}
         dvls = of_kind(setup.sensors, DvlSettings)
+        self._nearer = setup.settings.nearer
+        self._nearer_error = max(setup.settings.nearer_error, 1e-6)
         self._scale = max((d.scale_error for d in dvls.values()), default=0.0)
         self._mounting = max((math.radians(d.misalignment_deg) for d in dvls.values()), default=0.0)
         self._gps: GpsSettings | None = next(iter(of_kind(setup.sensors, GpsSettings).values()), None)
+        self._gyro = next(iter(of_kind(setup.sensors, GyroSettings)), None)
         super().__init__(setup)
 
     def _motion(self) -> Motion:
         """Surge and sway are what the DVL shows: its scale is then no part of what it measures, and nothing but
-        positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known."""
+        positions and frames can tell it. As a factor of the measurement a Kalman filter took it for known.
+
+        The heading turns as the gyro says, all of its readings: by a yaw rate that is known at each update only, it
+        would be lost by half a degree from one to the next. The yaw rate is then a state by the way.
+        """
         motion = with_error(with_error(super()._motion(), SCALE, "1"), MOUNTING, "rad")
+        turned = self._gyro is not None  # the function below shall not hold the navigator
+        for name, unit in {NEARER: "m", **dict.fromkeys(RELIEF, "1")}.items():
+            motion = with_error(motion, name, unit)
         if self._gps is not None:
             for name in GPS_ERRORS:
                 motion = with_error(motion, name, "m", time_constant=self._gps.wander_time)
@@ -104,14 +120,17 @@ class SonarNavigator(ReckoningNavigator):
         def rates(x: Symbols, u: Symbols) -> Symbols:
             c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
             true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
-            return motion.rates({**x, **true}, u)
+            found = motion.rates({**x, **true}, u)
+            return {**found, "heading": u[TURN_RATE] - x["gyro_bias"]} if turned else found
 
-        return replace(motion, rates=rates)
+        return replace(motion, rates=rates, inputs=(TURN_RATE,) if turned else ())
 
     def _estimator_of(self, motion: Motion, process: MotionProcess, models: Models, setup: NavigatorSetup) -> Estimator:
         s = setup.settings
         if self._gps is not None:
             models = {**models, GPS: sensors.fix(motion, bias=GPS_ERRORS)}
+        if self._gyro:
+            models = {**models, GYRO: sensors.gyro(motion)}
         keyframes = replace(KEYFRAMES, closures=s.closures, spacing=s.keyframes) if s.match else None
         filter_ = KeyframeFilter(
             self._matcher,
@@ -121,9 +140,19 @@ class SonarNavigator(ReckoningNavigator):
             gates=dict.fromkeys(models, 0.9999),
             window=WINDOW,
             keyframes=keyframes,
+            nearer=motion.space.index(NEARER),
         )
         self._matches, self._stride = s.match, s.stride
         return Estimator(filter_, step=setup.period, keep=s.keep)
+
+    def _input_noise(self, setup: NavigatorSetup) -> dict[str, float]:
+        """Power spectral densities of the noise of the motion's inputs, by input [unit2 s]."""
+        gyros = of_kind(setup.sensors, GyroSettings)
+        return {TURN_RATE: math.radians(gyros[self._gyro].noise_density_deg) ** 2} if self._gyro else {}
+
+    def _inputs(self, time: float) -> tuple[float, ...]:
+        """The mean turn rate since the last update."""
+        return (self._turning.mean(time),) if self._gyro else ()
 
     def _walks(self, setup: NavigatorSetup) -> dict[str, float]:
         walks = super()._walks(setup)
@@ -134,16 +163,29 @@ class SonarNavigator(ReckoningNavigator):
 
     def _known(self) -> dict[str, float]:
         wander = {} if self._gps is None else dict.fromkeys(GPS_ERRORS, max(float(self._gps.wander), 1e-6))
-        return {**super()._known(), SCALE: max(self._scale, 1e-6), MOUNTING: max(self._mounting, 1e-6), **wander}
+        relief = dict(zip(RELIEF, (DISTANCES, DISTANCES, DISTANCES / ARM), strict=True))
+        return {
+            **super()._known(),
+            SCALE: max(self._scale, 1e-6),
+            MOUNTING: max(self._mounting, 1e-6),
+            NEARER: self._nearer_error,
+            **relief,
+            **wander,
+        }
 
     def _beginning(self) -> Start:
         """As without a sonar; where the first fix is of GPS, its slow error is one of the position too."""
-        return replace(super()._beginning(), slow={} if self._gps is None else {GPS: GPS_ERRORS})
+        return replace(
+            super()._beginning(),
+            slow={} if self._gps is None else {GPS: GPS_ERRORS},
+            means={NEARER: (1.0 - ALIKE) * self._nearer},
+        )
 
     def reset(self) -> None:
         """Forgets everything."""
         super().reset()
         self._altitude = self._floor = math.nan
+        self._turning = RateMean()
         self._echoes, self._heard = 0, -math.inf  # echoes of the floor in a row, and when the last came [s]
         self._fixed: float | None = None  # when there was a fix last [s]
         self._counts: dict[int, int] = {}  # readings in each mean since the last update, by its id
@@ -161,6 +203,10 @@ class SonarNavigator(ReckoningNavigator):
                 self._hear(reading)
         fixes = [reading for reading in plain if reading.sensor == "usbl"]
         means = []
+        for reading in plain:
+            if reading.sensor == self._gyro:
+                for measurement in super()._measured(reading):
+                    self._turning.add(reading.stamp, float(measurement.value[0]))
         self._counts.clear()
         for reading, count in averaged([r for r in plain if r not in fixes]):
             means.append(reading._replace(stamp=round(reading.stamp, 6)))

@@ -30,7 +30,7 @@ class SectorFrames:
     polar: PolarGrid  # of the sonar, its ranges slant
     grid: SectorGrid
     surroundings: float = 1.0  # standard deviation of the Gaussian over which the mean of a cell's is taken [m]
-    nearer: float = 0.0  # by which echoes come from before the middle of rocks, along the slant range [m]
+    nearer: float = 0.0  # by which echoes come from before what they are of, along the level [m]
 
     def frame(self, intensity: np.ndarray, *, altitude: float, stamp: float, sequence: int | None = None) -> SonarFrame:
         """The standardised frame of a ping.
@@ -51,7 +51,7 @@ class SectorFrames:
     def _on_the_floor(self, intensity: Array, altitude: float) -> Array:
         """Intensities (beams, ranges) at even horizontal ranges, interpolated; the last ones held."""
         slant, horizontal = np.array(self.polar.ranges), np.array(self._floor.ranges)
-        at = (np.hypot(horizontal, altitude) - self.nearer - slant[0]) / (slant[1] - slant[0])
+        at = (np.hypot(np.maximum(horizontal - self.nearer, 0.0), altitude) - slant[0]) / (slant[1] - slant[0])
         at = np.clip(at, 0.0, len(slant) - 1.0)
         before = np.minimum(at.astype(int), len(slant) - 2)
         share = at - before

@@ -45,15 +45,15 @@ class Keyframes:
     closures: bool = True  # whether loops are closed
     gap: int = 60  # frames between the two of a closure at least
     distance: float = 12.0  # between the places that the two look at, at most [m]
-    turn: float = (
-        0.5  # between their headings, at most: from elsewhere light and shade differ, alike in all frames [rad]
-    )
+    turn: float = np.pi  # between their headings, at most [rad]
+    alike: float = 0.5  # between their headings up to which they show the same sides of rocks and slopes [rad]
     interval: int = 2  # frames from one attempt to the next
     support: int = 3  # keyframes that are matched at once at most
     ratio: float = 25.0  # least log-likelihood of a closure against no relation
     search: Search = Search(limits=(4.0, 4.0, np.radians(4.0)))  # noqa: RUF009 - immutable
     search_prior: tuple[float, float, float] = (0.1, 0.1, np.radians(0.5))  # added to that of the search, deviations
     covariance_factor: float = 6.0  # of a closure: relief moves echoes, of neighbouring closures alike
+    other_factor: float = 25.0  # the same where headings are not alike
 
 
 class Closure(NamedTuple):
@@ -111,6 +111,7 @@ class KeyframeFilter(WindowFilter):
         window: Which of the last frames to match against.
         search: Which poses to try for that.
         keyframes: What is kept beyond the window; None: nothing, and no loop is closed.
+        nearer: Which state is the distance by which echoes come from before what they are of [m]; None: none is.
         saturation: Value at which the receiver saturates.
     """
 
@@ -125,6 +126,7 @@ class KeyframeFilter(WindowFilter):
         window: Window | None = None,
         search: Search | None = None,
         keyframes: Keyframes | None = None,
+        nearer: int | None = None,
         saturation: float = np.inf,
     ) -> None:
         nowhere = Gaussian(mean=np.zeros(3), covariance=np.eye(3))
@@ -132,7 +134,7 @@ class KeyframeFilter(WindowFilter):
         self._keyframes = keyframes or Keyframes(closures=False, spacing=0)
         self._closing = Matcher(matcher.grid, replace(matcher.model, together=self._keyframes.support))
         self.process, self.sensors = process, sensors  # pyright: ignore[reportIncompatibleVariableOverride]
-        self._begin, self._gates = start, gates or {}
+        self._begin, self._gates, self._nearer = start, gates or {}, nearer
 
     def start(self, nodes: Sequence[Node[KeyframeState]], index: int) -> KeyframeState | None:  # pyright: ignore
         """State at the first node that suffices."""
@@ -235,12 +237,11 @@ class KeyframeFilter(WindowFilter):
         settings, latest = self._keyframes, state.count - 1
         if not settings.closures or latest % settings.interval:
             return state
-        found = self._candidate(state)
         oldest = latest - self._window.kept + 1
-        pending = tuple(c for c in state.pending if c.later >= oldest)
-        if found is None:
+        found = self._candidates(state)
+        pending = (*(c for c in state.pending if c.later >= oldest), *found)
+        if not found:
             return state._replace(pending=pending)
-        pending = (*pending, found)
         believed = self._agreeing(state, pending)
         if len(believed) < LEAST:
             return state._replace(pending=pending)
@@ -254,39 +255,56 @@ class KeyframeFilter(WindowFilter):
         rest = tuple(c for k, c in enumerate(pending) if k not in believed)
         return state._replace(pending=rest, closed=state.closed + closed)
 
-    def _candidate(self, state: KeyframeState) -> Closure | None:
-        """A match of the latest frame with the keyframes of earlier lanes that look at the same floor."""
+    def _candidates(self, state: KeyframeState) -> list[Closure]:
+        """Matches of the latest frame with keyframes that look at the same floor: from alike, and from elsewhere."""
         settings, latest, poses = self._keyframes, state.count - 1, state.poses
         ahead = self.matcher.grid.ahead + 0.5 * sum(self.matcher.grid.ranges)
         looked_at = poses[:, :2] + ahead * np.stack((np.cos(poses[:, 2]), np.sin(poses[:, 2])), axis=1)
-        old = [k for k, number in enumerate(state.numbers) if MARKED < number <= latest - settings.gap]
-        if not old:
-            return None
+        old = np.array([k for k, number in enumerate(state.numbers) if MARKED < number <= latest - settings.gap], int)
         turns = np.abs(wrapped(poses[old, 2] - poses[-1, 2]))
-        distances = np.where(turns <= settings.turn, np.hypot(*(looked_at[old] - looked_at[-1]).T), np.inf)
-        near = [old[k] for k in np.argsort(distances)[: settings.support] if distances[k] <= settings.distance]
-        if not near:
-            return None
-        n = state.size
-        later, places = state.place(latest), [n + 3 * k for k in near]
-        relation = Relation.of_pose(state.whole, n, places, later)
+        distances = np.hypot(*(looked_at[old] - looked_at[-1]).T)
+        near = (distances <= settings.distance) & (turns <= settings.turn)
+        found = []
+        for group, factor in (
+            (near & (turns <= settings.alike), settings.covariance_factor),
+            (near & (turns > settings.alike), settings.other_factor),
+        ):
+            nearest = old[group][np.argsort(distances[group])[: settings.support]].tolist()
+            closure = self._matched(state, nearest, factor) if nearest else None
+            found += [] if closure is None else [closure]
+        return found
+
+    def _matched(self, state: KeyframeState, earlier: Sequence[int], factor: float) -> Closure | None:
+        """The match of the latest frame with some earlier ones."""
+        settings, latest, n = self._keyframes, state.count - 1, state.size
+        places = [n + 3 * k for k in earlier]
+        relation = Relation.of_pose(state.whole, n, places, state.place(latest))
         prior = relation.covariance(0) + np.diag(np.square(settings.search_prior))
-        earlier = [state.frames[k] for k in near]
-        found = match(self._closing, state.frames[-1], earlier, relation.relatives, prior, settings.search)
+        expected, nearer = relation.relatives, self._nearer
+        if nearer is not None:
+            moved = np.pad(_by_nearer(relation), ((0, 0), (0, 1)))
+            expected = compose(expected, moved * state.whole.mean[nearer])
+            prior += np.outer(moved[0], moved[0]) * state.whole.covariance[nearer, nearer]
+        frames = [state.frames[k] for k in earlier]
+        found = match(self._closing, state.frames[-1], frames, expected, prior, settings.search)
         if isinstance(found, str) or found.log_likelihood < settings.ratio:
             return None
         if (np.abs(found.offset) > settings.search.limits).any():
             return None
-        measured = compose(relation.relatives, found.offset)
-        numbers = tuple(state.numbers[k] for k in near)
-        return Closure(latest, numbers, measured, found.weights, settings.covariance_factor * found.covariance)
+        measured = compose(expected, found.offset)
+        numbers = tuple(state.numbers[k] for k in earlier)
+        return Closure(latest, numbers, measured, found.weights, factor * found.covariance)
 
     def _innovation(self, state: KeyframeState, closure: Closure) -> tuple[Array, Array]:
         """Derivative (3, n + 3 k) and residual (3,) of a closure in the present state."""
         places = [state.place(number) for number in closure.earlier]
         relation = Relation.of_pose(state.whole, state.size, places, state.place(closure.later))
+        H = relation.jacobian(closure.weights)
         residual = closure.weights @ between(relation.relatives, closure.measured)
-        return relation.jacobian(closure.weights), residual
+        if self._nearer is not None:
+            H[:2, self._nearer] = closure.weights @ _by_nearer(relation)
+            residual[:2] -= H[:2, self._nearer] * state.whole.mean[self._nearer]
+        return H, residual
 
     def _agreeing(self, state: KeyframeState, pending: Sequence[Closure]) -> list[int]:
         """Indices of the largest set found of closures that agree with the state, and each with each other."""
@@ -301,6 +319,15 @@ class KeyframeFilter(WindowFilter):
                 S[3:, 3:] += pending[b].covariance
                 agree[a, b] = agree[b, a] = r @ np.linalg.solve(S, r) <= limit
         return largest_clique(agree)
+
+
+def _by_nearer(relation: Relation) -> Array:
+    """How far (k, 2) a match is moved, in the later pose's axes, for each metre by which echoes come from before.
+
+    Each frame sees what it sees nearer to itself, along its heading.
+    """
+    turn = -relation.relatives[:, 2]  # of the earlier heading from the later one
+    return np.stack((1.0 - np.cos(turn), -np.sin(turn)), axis=1)
 
 
 def _seen(P: Array, H: Array) -> Array:
