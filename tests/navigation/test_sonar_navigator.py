@@ -146,3 +146,17 @@ def test_frames_are_of_the_place_of_the_transducer(navigator: Any) -> None:
     """Their cells lie as far ahead of the vehicle's origin as the sonar."""
     grid = navigator.grid
     assert grid.centres[0, 0, 0] == pytest.approx(1.3 + 0.5 * grid.cell)
+
+
+def test_the_heading_turns_as_the_gyro_says_within_an_update(navigator: Any) -> None:
+    """A swing that begins and ends between two updates, without a compass: a rate known at updates only shows none."""
+    located(navigator, 20)
+    before = navigator.update(20.5, [compass(20.5)], (), NONE).heading
+    stamps = 20.5 + 0.05 * np.arange(1, 11)
+    rates = 0.4 * np.sin(np.pi * (stamps - 20.5) / 0.5) ** 2
+    swing = [
+        Reading("gyro", t, t, np.array((0.0, 0.0, r)), k) for k, (t, r) in enumerate(zip(stamps, rates, strict=True))
+    ]
+    after = navigator.update(21.0, swing, (), NONE).heading
+    # The integral is 0.1 rad; the bias at the start, 1e-3 rad/s, may turn it by as much again in half a second.
+    assert after - before == pytest.approx(0.1, abs=2e-3)
