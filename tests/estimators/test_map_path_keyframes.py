@@ -71,6 +71,30 @@ def test_the_match_is_looked_for_where_it_is_expected() -> None:
     assert lost is None or np.abs(FILTER._innovation(narrow, lost)[1]).max() > 0.5
 
 
+def test_what_is_not_known_of_nearer_widens_the_search() -> None:
+    """All poses are known and `nearer` is 1 m wrong, two and a half of its deviations: the match shows that error."""
+    start = state(NEARER - 1.0)
+    variances = np.full(start.whole.mean.size, 1e-6)
+    variances[3] = 0.4**2
+    closure = FILTER._matched(
+        start._replace(whole=Gaussian(mean=start.whole.mean, covariance=np.diag(variances))), [0], 1.0
+    )
+    assert closure is not None
+    H, residual = FILTER._innovation(start, closure)
+    assert residual == pytest.approx(H[:, 3], abs=0.04)
+
+
+def test_only_keyframes_that_look_near_the_same_place_are_matched() -> None:
+    """These two look at places 8.6 m apart."""
+    looked_at = [compose(pose, np.array((9.5, 0.0, 0.0)))[:2] for pose in (EARLIER, LATER)]
+    apart = float(np.hypot(*(looked_at[1] - looked_at[0])))
+    for distance, count in ((apart - 0.1, 0), (apart + 0.1, 1)):
+        filter_ = KeyframeFilter(
+            MATCHER, PROCESS, {}, lambda *_: None, keyframes=Keyframes(gap=1, support=1, distance=distance), nearer=3
+        )
+        assert len(filter_._candidates(state(NEARER))) == count
+
+
 def test_alike_and_other_headings_are_matched_apart() -> None:
     """Two keyframes look at the same place as the last frame, one from its side: two closures, the other's is doubted.
 
@@ -85,5 +109,6 @@ def test_alike_and_other_headings_are_matched_apart() -> None:
         plain = FILTER._matched(kept, [closure.earlier[0]], 1.0)
         assert plain is not None
         np.testing.assert_allclose(closure.covariance, factor * plain.covariance)
+    assert [c.later for c in closures] == [2, 2]
     far = compose(LATER, np.array((-30.0, 0.0, 0.0)))
     assert FILTER._candidates(state(NEARER, (far, LATER))) == []
