@@ -121,7 +121,7 @@ class SonarNavigator(ReckoningNavigator):
             c, s, k = ca.cos(x[MOUNTING]), ca.sin(x[MOUNTING]), 1.0 + x[SCALE]
             true = {"surge": (c * x["surge"] - s * x["sway"]) / k, "sway": (s * x["surge"] + c * x["sway"]) / k}
             found = motion.rates({**x, **true}, u)
-            return {**found, "heading": u[TURN_RATE] + x["gyro_bias"]} if turned else found
+            return {**found, "heading": u[TURN_RATE] - x["gyro_bias"]} if turned else found
 
         return replace(motion, rates=rates, inputs=(TURN_RATE,) if turned else ())
 

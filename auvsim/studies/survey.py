@@ -29,7 +29,8 @@ from auvsim.simulation.setups import navigator_setup
 RECKONING, OPEN, CLOSED, WHOLE = "dead reckoning", "sonar, no closures", "sonar", "sonar, path at the end"
 FIXED = "sonar, path after a second fix"
 PINNED = {"vehicles": {"remus100": {"mission": {"second_fix": True}}}}
-BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
+# Without closures frames that leave the window are of no use, and all of them would be kept in the state.
+BESIDE: Mapping[str, Mapping[str, Any]] = {RECKONING: {"match": False}, OPEN: {"closures": False, "keyframes": 1000}}
 
 
 @dataclass(frozen=True, kw_only=True)
