@@ -34,7 +34,7 @@ class Closures(NamedTuple):
 
     times: Array  # (n,) when each was believed [s]
     later: Array  # (n,) stamp of its frame [s]
-    earlier: Array  # (n,) stamp of a keyframe that was matched [s]; NaN if not known
+    earlier: Array  # (n,) stamp of a keyframe that was matched [s]
 
 
 class TurnedErrors(NamedTuple):

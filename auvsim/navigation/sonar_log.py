@@ -11,7 +11,7 @@ import numpy as np
 
 from auvsim.data.variables import TIME, Group, Table, Variable
 from auvsim.navigation.navigator import Navigator
-from auvsim.navigation.sonar import WINDOW, SonarNavigator
+from auvsim.navigation.sonar import SonarNavigator
 from estimators.map_path.keyframes import MARKED, KeyframeState
 from estimators.map_path.poses import wrapped
 
@@ -27,7 +27,7 @@ TABLES: dict[str, Table] = {
     CLOSURES: {
         "time": Variable((), "float64", "s", "when a loop closure was believed"),
         "later": Variable((), "float64", "s", "stamp of the frame that closes the loop"),
-        "earlier": Variable((), "float64", "s", "stamp of a keyframe that it was matched with; NaN if not known"),
+        "earlier": Variable((), "float64", "s", "stamp of a keyframe that it was matched with"),
     },
     PATH: {
         "time": Variable((), "float64", "s", "stamp of a keyframe, or of the begin of the dive"),
@@ -63,7 +63,7 @@ class SonarLog:
 
     def __init__(self, navigator: SonarNavigator) -> None:
         self._navigator = navigator
-        self._before: KeyframeState | None = None
+        self._links = 0  # logged so far
 
     @property
     def groups(self) -> dict[str, Group]:
@@ -74,11 +74,12 @@ class SonarLog:
 
     def rows(self, time: float) -> list[Row]:
         """What is new after an update at a time [s]."""
-        before, now = self._before, self._state
-        self._before = now
+        now = self._state
+        links = () if now is None else now.links
+        before, self._links = self._links, len(links)
         dive = np.full(2, math.nan) if now is None or now.mark is None else now.mark[1][:2].copy()
         rows = [Row(MATCHING, (time, 0 if now is None else now.closed, dive))]
-        return rows + [Row(CLOSURES, (time, *pair)) for pair in believed(before, now)]
+        return rows + [Row(CLOSURES, (time, *pair)) for pair in links[before:]]
 
     def path(self) -> list[Row]:
         """The path, when the run ends."""
@@ -107,22 +108,3 @@ class SonarLog:
 def sonar_log(navigator: Navigator) -> SonarLog | None:
     """What watches a navigator, if it navigates by a sonar."""
     return SonarLog(navigator) if isinstance(navigator, SonarNavigator) else None
-
-
-def believed(before: KeyframeState | None, now: KeyframeState | None) -> list[tuple[float, float]]:
-    """Stamps of both ends of the loop closures that were believed between two states [s].
-
-    They are those that wait no longer though their frame is still in the window; of the latest frame's own closure the
-    state does not tell with what it was matched.
-    """
-    if before is None or now is None or now.closed <= before.closed:
-        return []
-    stamps = dict(zip(now.numbers, now.stamps, strict=True))
-    latest, waiting = now.count - 1, {closure.later for closure in now.pending}
-    pairs = [
-        (stamps[closure.later], stamps[earlier])
-        for closure in before.pending
-        if closure.later not in waiting and closure.later > latest - WINDOW.kept
-        for earlier in closure.earlier
-    ]
-    return pairs if latest in waiting else [*pairs, (stamps[latest], math.nan)]

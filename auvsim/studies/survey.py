@@ -25,11 +25,13 @@ from auvsim.navigation.estimate import Estimate
 from auvsim.simulation.loading import load_scenario
 from auvsim.simulation.run import Simulation
 from auvsim.simulation.setups import navigator_setup
+from estimators.map_path.poses import rotation_to, turned
 
 RECKONING, OPEN, CLOSED, WHOLE = "dead reckoning", "sonar, no closures", "sonar", "sonar, path at the end"
 FIXED = "sonar, path after a second fix"
 PINNED = {"vehicles": {"remus100": {"mission": {"second_fix": True}}}}
-BESIDE: Mapping[str, Mapping[str, bool]] = {RECKONING: {"match": False}, OPEN: {"closures": False}}
+# Without closures frames that leave the window are of no use, and all of them would be kept in the state.
+BESIDE: Mapping[str, Mapping[str, Any]] = {RECKONING: {"match": False}, OPEN: {"closures": False, "keyframes": 1000}}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,14 +169,7 @@ def judged(path: Array, covariances: Array | None, true: Array, believed: Array,
     if covariances is not None:
         nees = float(np.einsum("ki,ki->k", off, np.linalg.solve(covariances, off[..., None])[..., 0]).mean()) / 2.0
     p, q = path - believed, true - at
-    return Errors(rms(off), rms(turned(p, q) - q), nees)
-
-
-def turned(p: Array, q: Array) -> Array:
-    """A path (n, 2) after the rotation about the origin that brings it closest to another (n, 2)."""
-    angle = math.atan2(float((p[:, 0] * q[:, 1] - p[:, 1] * q[:, 0]).sum()), float((p * q).sum()))
-    c, s = math.cos(angle), math.sin(angle)
-    return p @ np.array(((c, s), (-s, c)))
+    return Errors(rms(off), rms(turned(p, rotation_to(p, q)) - q), nees)
 
 
 def rms(off: Array) -> float:

@@ -78,6 +78,7 @@ class KeyframeState(NamedTuple):
     count: int = 0  # frames so far
     pending: tuple[Closure, ...] = ()
     closed: int = 0  # closures believed so far
+    links: tuple[tuple[float, float], ...] = ()  # stamps of their later and earlier frames, one of each pair [s]
     refused: tuple[tuple[str, int], ...] = ()  # measurements refused in a row, by kind
 
     size = WindowState.size
@@ -245,15 +246,17 @@ class KeyframeFilter(WindowFilter):
         believed = self._agreeing(state, pending)
         if len(believed) < LEAST:
             return state._replace(pending=pending)
-        closed = 0
+        closed, links, stamps = 0, list(state.links), dict(zip(state.numbers, state.stamps, strict=True))
         for k in believed:
             H, residual = self._innovation(state, pending[k])
             limit = chi_square(PROBABILITY, 3)
             whole, innovation = ekf.correct_linear(state.whole, H, residual, pending[k].covariance, limit)
-            closed += innovation.accepted
+            if innovation.accepted:
+                closed += 1
+                links += [(stamps[pending[k].later], stamps[earlier]) for earlier in pending[k].earlier]
             state = state._replace(whole=with_angles(whole, state.size))
         rest = tuple(c for k, c in enumerate(pending) if k not in believed)
-        return state._replace(pending=rest, closed=state.closed + closed)
+        return state._replace(pending=rest, closed=state.closed + closed, links=tuple(links))
 
     def _candidates(self, state: KeyframeState) -> list[Closure]:
         """Matches of the latest frame with keyframes that look at the same floor: from alike, and from elsewhere."""

@@ -10,7 +10,7 @@ GRID = SectorGrid(cell=0.5, shape=(40, 80), ranges=(1.0, 20.0), half_sector=np.r
 POLAR = PolarGrid(
     bearings=tuple(np.radians(np.linspace(-60.0, 60.0, 121)).tolist()), ranges=tuple(np.arange(1.0, 21.0, 0.1).tolist())
 )
-NEARER = 0.15
+NEARER = 0.8
 MAKER = SectorFrames(polar=POLAR, grid=GRID, nearer=NEARER)
 
 
@@ -26,10 +26,10 @@ def made(intensity: np.ndarray, altitude: float = 4.0) -> np.ndarray:
 
 @pytest.mark.parametrize("altitude", [0.5, 6.0])
 def test_an_echo_is_laid_on_the_floor_below_its_slant_range(altitude: float) -> None:
-    """A bright sample from the near side of what lies at 0.3 rad to starboard and 9.3 m ahead on the floor."""
-    bearing, horizontal = 0.3, 9.3
+    """A bright sample from the near side of what lies at 0.3 rad to starboard and 5.3 m away on the floor."""
+    bearing, horizontal = 0.3, 5.3
     beam = int(np.argmin(np.abs(np.array(POLAR.bearings) - bearing)))
-    sample = int(np.argmin(np.abs(np.array(POLAR.ranges) - (np.hypot(horizontal, altitude) - NEARER))))
+    sample = int(np.argmin(np.abs(np.array(POLAR.ranges) - np.hypot(horizontal - NEARER, altitude))))
     intensity = np.ones(POLAR.shape)
     intensity[beam, sample] = 1000.0
     row, column = np.unravel_index(int(np.argmax(made(intensity, altitude))), GRID.shape)

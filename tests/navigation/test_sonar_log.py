@@ -10,31 +10,25 @@ import pytest
 
 from auvsim.data.log import read
 from auvsim.navigation import sonar_log
-from auvsim.navigation.sonar import WINDOW
-from auvsim.navigation.sonar_log import PATH, SHADES, TABLES, SonarLog, believed
+from auvsim.navigation.sonar_log import PATH, SHADES, TABLES, SonarLog
 from auvsim.simulation.loading import load_scenario
 from auvsim.simulation.run import run
 from estimators.core.types import Gaussian
 from estimators.map_path.frames import SectorGrid
-from estimators.map_path.keyframes import MARKED, Closure, KeyframeState
+from estimators.map_path.keyframes import MARKED, KeyframeState
 
 GRID = SectorGrid(cell=0.3, shape=(5, 8), ranges=(0.4, 1.4), half_sector=0.9, ahead=1.1)
 NUMBERS, STAMPS = (MARKED, 0, 7, 20, 21, 22), (61.0, 64.0, 92.0, 144.0, 148.0, 152.0)
 
 
-def closure(later: int, *earlier: int) -> Closure:
-    """A match that waits."""
-    return Closure(later, earlier, np.zeros((len(earlier), 3)), np.ones(len(earlier)), np.eye(3))
-
-
-def state(count: int, closed: int, *pending: Closure) -> KeyframeState:
+def state(count: int, closed: int, *links: tuple[float, float]) -> KeyframeState:
     """A state of five frames and a mark, 5 states of the vehicle's own."""
     rng = np.random.default_rng(5)
     root = rng.normal(size=(23, 23))
     whole = Gaussian(mean=rng.normal(size=23) + np.tile((0.0, 0.0, 3.0), 8)[:23], covariance=root @ root.T)
     frames = tuple(SimpleNamespace(values=(k + 1.0) * rng.normal(size=GRID.shape)) for k in range(6))
     held: Any = frames
-    return KeyframeState(whole, held, numbers=NUMBERS, stamps=STAMPS, count=count, closed=closed, pending=pending)
+    return KeyframeState(whole, held, numbers=NUMBERS, stamps=STAMPS, count=count, closed=closed, links=links)
 
 
 def navigator(held: KeyframeState | None) -> Any:
@@ -42,30 +36,21 @@ def navigator(held: KeyframeState | None) -> Any:
     return SimpleNamespace(grid=GRID, _estimator=SimpleNamespace(history=SimpleNamespace(state=held)))
 
 
-def test_closures_that_wait_no_longer_were_believed() -> None:
-    """Of two that waited both ends are told, of the latest frame's its own; one that went stale was not believed."""
-    assert WINDOW.kept == 4
-    before = state(22, 9, closure(18, 0), closure(20, 7, 0), closure(21, 0))
-    found = believed(before, state(23, 12))
-    np.testing.assert_array_equal(np.array(found), [(144.0, 92.0), (144.0, 64.0), (148.0, 64.0), (152.0, math.nan)])
-    assert believed(before, state(23, 12, closure(21, 0), closure(22, 7))) == [(144.0, 92.0), (144.0, 64.0)]
-    assert believed(before, state(23, 9)) == []  # none more than before: all were only too old
-    assert believed(None, state(23, 12)) == believed(before, None) == []
-
-
-def test_rows_of_an_update_tell_count_and_dive_point(monkeypatch) -> None:
-    """NaN before the dive; the closures of this update beside them."""
-    log = SonarLog(navigator(None))
+def test_rows_of_an_update_tell_count_dive_point_and_new_closures() -> None:
+    """NaN before the dive; each pair of frames of a closure once, in the update in which it was believed."""
+    watched = navigator(None)
+    log = SonarLog(watched)
     (row,) = log.rows(3.0)
     assert row.values[:2] == (3.0, 0)
     assert np.isnan(row.values[2]).all()
-    held = state(23, 4)
-    watched = SonarLog(navigator(held))
-    monkeypatch.setattr(sonar_log, "believed", lambda before, now: [(1.0, 2.0)] if now is held else [])
-    matching, pair = watched.rows(5.0)
-    assert matching.values[:2] == (5.0, 4)
-    np.testing.assert_array_equal(matching.values[2], held.poses[0, :2])
-    assert pair == (sonar_log.CLOSURES, (5.0, 1.0, 2.0))
+    first, more = ((144.0, 64.0), (144.0, 92.0)), (148.0, 64.0)
+    for time, links, new in ((5.0, first, first), (5.5, first, ()), (6.0, (*first, more), (more,))):
+        held = state(23, len(links), *links)
+        watched._estimator.history.state = held
+        matching, *pairs = log.rows(time)
+        assert matching.values[:2] == (time, len(links))
+        np.testing.assert_array_equal(matching.values[2], held.poses[0, :2])
+        assert pairs == [(sonar_log.CLOSURES, (time, *pair)) for pair in new]
 
 
 def test_the_path_is_that_of_the_state() -> None:
@@ -99,11 +84,10 @@ def test_a_survey_logs_its_path_and_closures(tmp_path: Path) -> None:
     assert log.log.attributes["status"] == found.attributes["status"]
     rows, path, counts = log[sonar_log.CLOSURES], log[PATH], log[sonar_log.MATCHING]["closures"]
     assert counts[-1] >= 3
-    assert len(np.unique(np.column_stack((rows["time"], rows["later"])), axis=0)) == counts[-1]
-    known = np.isfinite(rows["earlier"])
-    assert known.sum() >= 2
-    assert (rows["later"][known] - rows["earlier"][known] > 60.0).all()  # of another lane
-    assert np.isin(rows["earlier"][known], path["time"][path["frame"]]).all()
+    # One or two keyframes each; a frame closes a loop with those seen from its side and from another.
+    assert counts[-1] <= len(rows["later"]) <= 2 * counts[-1]
+    assert (rows["later"] - rows["earlier"] >= 30.0).all()
+    assert np.isin(rows["earlier"], path["time"][path["frame"]]).all()
     assert path["frame"].tolist() == [False] + [True] * (len(path["time"]) - 1)
     estimate = log["estimate"]
     then = np.column_stack([np.interp(path["time"], estimate["time"], estimate["position"][:, k]) for k in range(2)])

@@ -146,3 +146,41 @@ def test_frames_are_of_the_place_of_the_transducer(navigator: Any) -> None:
     """Their cells lie as far ahead of the vehicle's origin as the sonar."""
     grid = navigator.grid
     assert grid.centres[0, 0, 0] == pytest.approx(1.3 + 0.5 * grid.cell)
+
+
+def test_the_heading_turns_as_the_gyro_says_within_an_update(navigator: Any) -> None:
+    """A swing that begins and ends between two updates, without a compass: a rate known at updates only shows none."""
+    located(navigator, 20)
+    before = navigator.update(20.5, [compass(20.5)], (), NONE).heading
+    stamps = 20.5 + 0.05 * np.arange(1, 11)
+    rates = 0.4 * np.sin(np.pi * (stamps - 20.5) / 0.5) ** 2
+    swing = [
+        Reading("gyro", t, t, np.array((0.0, 0.0, r)), k) for k, (t, r) in enumerate(zip(stamps, rates, strict=True))
+    ]
+    after = navigator.update(21.0, swing, (), NONE).heading
+    # The integral is 0.1 rad; the bias at the start, 1e-3 rad/s, may turn it by as much again in half a second.
+    assert after - before == pytest.approx(0.1, abs=2e-3)
+
+
+def test_a_rate_that_no_compass_sees_is_the_gyros_bias(navigator: Any) -> None:
+    """The heading stays, and the bias is found as the gyro shows it: 4e-3 rad/s by 60 s of a compass of 2 deg."""
+    located(navigator, 20)
+    for k in range(1, 121):
+        time = 20.0 + 0.5 * k
+        found = navigator.update(
+            time, [compass(time), Reading("gyro", time, time, np.array((0.0, 0.0, 4e-3)), k)], (), NONE
+        )
+    # A line through 120 headings of 0.035 rad has a slope known to 1.8e-4 rad/s; four of that, as its walk adds to it.
+    assert found.value("gyro_bias") == pytest.approx(4e-3, abs=8e-4)
+    assert found.heading == pytest.approx(0.4, abs=0.03)
+
+
+def test_the_filter_begins_with_what_the_settings_say(navigator: Any) -> None:
+    """Echoes nearer by 0.4 m from other sides, of which frames are laid 0.24 m farther; the gyro's noise."""
+    found = located(navigator, 1)
+    own, filter_ = SonarSettings(), navigator._estimator.filter
+    k = found.names.index("echoes_nearer")
+    assert (navigator._frames.nearer, found.mean[k]) == (pytest.approx(0.24), pytest.approx(own.nearer - 0.24))
+    assert found.covariance[k, k] == pytest.approx(own.nearer_error**2)
+    assert filter_._nearer == k
+    assert filter_.process.input_noise == pytest.approx([math.radians(GyroSettings().noise_density_deg) ** 2])

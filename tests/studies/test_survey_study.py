@@ -19,9 +19,9 @@ from auvsim.studies.survey import (
     Trial,
     judged,
     raw_table,
-    turned,
     turned_table,
 )
+from estimators.map_path.poses import rotation_to, turned
 
 AT = np.array((40.0, -7.0))
 TRUE = AT + np.array([(0.0, 1.0), (60.0, 2.0), (61.0, 9.0), (3.0, 30.0), (-8.0, 12.0)])
@@ -42,7 +42,7 @@ def test_a_turned_and_displaced_path_is_free_of_error_after_the_rotation() -> No
 def test_the_rotation_is_the_best_one() -> None:
     """No angle of a fine grid brings a distorted path closer, and a distortion is not taken away."""
     p, q = (TRUE - AT) * (1.03, 0.98) + (0.4, -0.2), TRUE - AT
-    least = float(((turned(p, q) - q) ** 2).sum())
+    least = float(((turned(p, rotation_to(p, q)) - q) ** 2).sum())
     others = []
     for angle in np.linspace(-0.2, 0.2, 4001):
         c, s = math.cos(angle), math.sin(angle)
