@@ -76,7 +76,7 @@ def test_longest_run() -> None:
         (["three_vehicles"], "the scenario"),
         (["survey", "--altitude", "nan"], "--altitude nan must lie in 0.5 .. 1000 m"),
         (["survey", "--holds", "0"], "--holds 0 must be more than 0 and at most 1000 m"),
-        (["survey", "--spacing", "900"], "spacing 900 m: a floor of 309.8 x 309.8 m has one point only; give less"),
+        (["survey", "--spacing", "900"], "spacing 900 m: a floor of 310 x 310 m has one point only"),
         (["survey", "--scenario", "nothing"], "--scenario nothing goes with a file of depths; survey is itself"),
         (["survey", "--water.terrain.kind", "flat"], "a floor of kind flat shows nothing to match; give a grid"),
         (["survey", "--water.terrain.rockz", "1"], "rockz"),
