@@ -81,7 +81,7 @@ def floor_bound(scenario: Scenario, *, spacing: float = 1.0, altitude: float | N
         altitude: above the floor; by default that of the mission [m].
 
     Raises:
-        InputError: the floor is level or plane, or there is no such vehicle.
+        InputError: the floor is level, plane or not as wide as `spacing`, or there is no such vehicle.
     """
     name, vehicle = scenario.lone
     floor = build_terrain(scenario.water.terrain, scenario.water.sea_floor)
@@ -156,6 +156,9 @@ def _over(floor: GriddedFloor, seen: Sight, spacing: float) -> tuple[Array, Arra
         for count, step in zip(floor.depths.shape, (floor.corner.to_north, floor.corner.to_east), strict=True)
     )
     every = max(1, round(spacing / cell))
+    if every >= min(rows, columns):
+        sides = " x ".join(f"{cell * (count - 1):.4g}" for count in (rows, columns))
+        raise InputError(f"spacing {spacing:g} m: a floor of {sides} m has one point only; give less")
     margin = math.ceil(
         (0.5 * math.sqrt(np.count_nonzero(seen.grid.seen)) * seen.grid.cell + 5.0 * seen.surroundings) / cell
     )

@@ -25,8 +25,8 @@ WIDTH = 96  # of the table [columns]
 
 
 def run(
-    floor: str, *, scenario: str, values: Mapping[str, Any], altitude: float | None, holds: float, spacing: float,
-    out: Path,
+    floor: str, *, scenario: str | None, values: Mapping[str, Any], altitude: float | None, holds: float,
+    spacing: float, out: Path,
 ) -> int:  # fmt: skip
     """Computes the bound, prints a table, fills the folder and returns the exit code.
 
@@ -39,11 +39,16 @@ def run(
         ("spacing", spacing, 0.05, 1000.0),
     ):
         if value is not None and not (math.isfinite(value) and low <= value <= high and value > 0.0):
-            raise InputError(f"command line: --{name} {value:g} must lie in {low:g} .. {high:g} m")
+            more = "be more than 0 and at most" if low == 0.0 else f"lie in {low:g} .."
+            raise InputError(f"command line: --{name} {value:g} must {more} {high:g} m")
     if Path(floor).suffix in ("", ".yaml", ".yml"):
+        if scenario is not None:
+            raise InputError(
+                f"command line: --scenario {scenario} goes with a file of depths; {floor} is itself a scenario"
+            )
         path = find(floor)
     else:
-        path = find(scenario)
+        path = find(scenario or "survey")
         values = sampling.merge({"water": {"terrain": {"kind": "grid", "file": floor}}}, values)
     plan = options.scenario(path, None, values, 0, 0)
     with output_folder(out), options.located(path, values):

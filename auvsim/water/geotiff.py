@@ -35,13 +35,22 @@ def read(path: Path) -> dict[str, Variable]:
         with Image.open(path) as image:
             tags = dict(image.tag_v2)  # pyright: ignore[reportAttributeAccessIssue] (of a TIFF)
             values = np.asarray(image, dtype=float)
-    except (UnidentifiedImageError, OSError, ValueError, SyntaxError, Image.DecompressionBombError) as error:
+    except Exception as error:  # readers of broken files raise errors of any kind
         kind = "its pixels are of no kind that is known" if isinstance(error, UnidentifiedImageError) else str(error)
+        reason = (kind.strip() or type(error).__name__).splitlines()[0]
         raise InputError(
-            f"a TIFF that cannot be read ({kind.splitlines()[0]}); `gdal_translate -b 1 -ot Float32` makes one that can"
+            f"a TIFF that cannot be read ({reason}); `gdal_translate -b 1 -ot Float32` makes one that can"
         ) from error
     if values.ndim != 2:
         raise InputError(f"an image of {values.shape[2]} colours, not a grid of depths")
+    try:
+        return _placed(values, tags)
+    except (TypeError, ValueError, IndexError, OverflowError) as error:
+        raise InputError(f"a TIFF whose tags are broken ({error}); `gdal_translate` writes them anew") from error
+
+
+def _placed(values: Array, tags: dict[int, Any]) -> dict[str, Variable]:
+    """The band and its coordinates, by the tags of the file."""
     keys = _keys(tags)
     model = keys.get(_MODEL)
     if model not in (PROJECTED, GEOGRAPHIC):

@@ -70,8 +70,9 @@ def read_variables(path: Path) -> dict[str, Variable]:
     try:
         classic = path.read_bytes()[:3] == b"CDF"
         return _classic(path) if classic else _netcdf4(path)
-    except (OSError, RuntimeError, KeyError, ValueError, TypeError) as error:
-        raise InputError(f"{path}: not a whole NetCDF file: {str(error).splitlines()[0]}") from error
+    except Exception as error:  # readers of broken files raise errors of any kind
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0]
+        raise InputError(f"{path}: not a whole NetCDF file: {reason}") from error
 
 
 def _classic(path: Path) -> dict[str, Variable]:
@@ -89,7 +90,7 @@ def _netcdf4(path: Path) -> dict[str, Variable]:
     with h5py.File(path, "r") as file:
         found = {}
         for name, item in file.items():
-            if not isinstance(item, h5py.Dataset) or item.dtype.kind not in "iuf":
+            if not isinstance(name, str) or not isinstance(item, h5py.Dataset) or item.dtype.kind not in "iuf":
                 continue
             scales = [str(axis[0].name).rsplit("/", 1)[-1] if len(axis) else "" for axis in item.dims]
             own = (name,) if item.is_scale and item.ndim == 1 else tuple(scales)

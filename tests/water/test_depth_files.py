@@ -182,10 +182,12 @@ def test_pixels_that_are_points(tmp_path: Path) -> None:
         ({33922: None}, "whose place is not given"),
         ({34264: (DOUBLE, (10.0, 1.0, 0, 0, 1.0, -10.0, *[0.0] * 10))}, "rows run neither north nor east"),
         ({42113: (TEXT, "-31.5")}, "1 of 54 points have no depth"),
+        ({33922: (DOUBLE, 0.0)}, "a TIFF whose tags are broken"),
+        ({34735: (SHORT, (1, 1, 0, 4, 1024, 0))}, "a TIFF whose tags are broken"),
     ],
 )
 def test_geotiffs_that_cannot_be_used(tmp_path: Path, change: dict, says: str) -> None:
-    """No reference system, no units, no place, turned, a hole."""
+    """No reference system, no units, no place, turned, a hole, tags of too few numbers."""
     tags = {number: tag for number, tag in {**POINTS, **change}.items() if tag is not None}
     values = -DEPTHS[::-1].copy()
     values[2, 3] = -31.5

@@ -237,8 +237,9 @@ def test_what_a_file_lacks_is_named(tmp_path):
     assert "no such file" in refusal(path)
     path.write_bytes(b"\x89HDF nothing")
     assert "not a whole NetCDF file" in refusal(path)
-    path.write_bytes(b"CDF\x01nothing")
-    assert "not a whole NetCDF file" in refusal(path)
+    for text in (b"CDF\x01nothing", b"CDF\x01\0\0", b"CDF\x01" + bytes(4) + b"\0\0\0\x0a\0\0\0\x01"):
+        path.write_bytes(text)
+        assert "not a whole NetCDF file" in refusal(path)
     zeros = np.zeros((6, 5))
     write4(path, {"y": NORTHS, "x": EASTS}, zeros, zeros, units="knot")
     assert "'v_northward' has the units 'knot'; known are m/s" in refusal(path)

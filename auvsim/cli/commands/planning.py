@@ -58,8 +58,8 @@ class Floor:
 
     floor: Annotated[str, tyro.conf.Positional, tyro.conf.arg(metavar="DEPTHS|SCENARIO.yaml|NAME")]
     """File of depths on a grid, such as NetCDF by CF conventions, or a scenario whose floor it is, such as survey."""
-    scenario: Annotated[str, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")] = "survey"
-    """Where depths are given: the scenario of the vehicle, its sonar and its lanes."""
+    scenario: Annotated[str | None, tyro.conf.arg(metavar="SCENARIO.yaml|NAME")] = None
+    """Where depths are given: the scenario of the vehicle, its sonar and its lanes; by default survey."""
     altitude: float | None = None
     """Height above the floor [m]; by default that of the mission."""
     holds: float = 0.1
