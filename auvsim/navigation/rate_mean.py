@@ -3,6 +3,8 @@
 import math
 from itertools import pairwise
 
+SILENT = 1.0  # time after its last reading when a sensor is taken to have failed [s]
+
 
 class RateMean:
     """Integrates a rate between its readings, as a straight line from each to the next."""
@@ -19,11 +21,13 @@ class RateMean:
     def mean(self, time: float) -> float:
         """Mean since the last time it was asked for; held before the first reading and after the last, 0 without any.
 
+        What fell silent more than a second before the interval began shows nothing, and 0 is returned.
+
         Args:
             time: Now [s], later than the last time.
         """
         since, self._since = self._since, time
-        if not self._readings:
+        if not self._readings or since - self._readings[-1][0] > SILENT:
             return 0.0
         if not math.isfinite(since):
             return self._readings[-1][1]

@@ -49,3 +49,14 @@ def test_without_any_reading_nothing_turns_and_bad_ones_are_left_out() -> None:
     for stamp, rate in ((1.1, 0.3), (1.1, 9.0), (1.05, 9.0), (1.2, math.nan), (1.3, 0.3)):
         mean.add(stamp, rate)
     assert mean.mean(1.5) == pytest.approx(0.3)
+
+
+def test_a_sensor_that_fell_silent_turns_nothing() -> None:
+    """Its last rate would turn a vehicle for the rest of a mission."""
+    mean = RateMean()
+    mean.mean(1.0)
+    mean.add(1.5, 0.3)
+    assert [mean.mean(2.0), mean.mean(2.4), mean.mean(3.0)] == [pytest.approx(0.3)] * 3
+    assert mean.mean(3.5) == 0.0
+    mean.add(3.8, -0.2)
+    assert mean.mean(4.0) < 0.0
