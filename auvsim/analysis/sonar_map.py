@@ -68,7 +68,7 @@ def overlay(log: VehicleLog, path: SonarPath) -> Overlay:
         if earlier in places
     ]
     believed = int(log["matching"]["closures"].max(initial=0)) if "matching" in log else 0
-    label = f"{believed} loop closures believed, {len(np.unique(found.later[known]))} drawn"
+    label = f"{believed} loop closures believed" + ("" if known.all() else ", not all drawn")
     return Overlay(truth["position"][during, :2], np.array(ends).reshape(-1, 2, 2), label)
 
 
