@@ -107,7 +107,7 @@ def turned_errors(log: VehicleLog) -> TurnedErrors | None:
 
 
 def turned_path_errors(log: VehicleLog, path: SonarPath) -> TurnedErrors | None:
-    """The same of the keyframes of the dive and after it."""
+    """Errors of the keyframes from the dive point on, after the best rotation about it; None without a dive point."""
     rows = log["path"]
     marks = np.flatnonzero(~rows["frame"])
     if not len(marks):

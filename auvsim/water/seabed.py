@@ -164,13 +164,20 @@ def _lay_pipeline(settings: SeabedSettings, axis: Array, heights: Array, strengt
     strength[on] = PIPE_ECHO
 
 
+def _scattered(
+    density: float, size: float, settings: SeabedSettings, axis: Array, generator: Generator
+) -> tuple[Array, Array]:
+    """Places (n, 2) of so many things a square metre, and their log-normal sizes (n,) about a median [m]."""
+    count = generator.poisson(density * settings.extent**2)
+    places = generator.uniform(axis[0], axis[-1], (count, 2))
+    return places, size * np.exp(0.4 * generator.standard_normal(count))
+
+
 def _place_rocks(
     settings: SeabedSettings, axis: Array, heights: Array, strength: np.ndarray, generator: Generator
 ) -> None:
     """Half-buried spheres."""
-    count = generator.poisson(settings.rocks * settings.extent**2)
-    places = generator.uniform(axis[0], axis[-1], (count, 2))
-    radii = settings.rock_radius * np.exp(0.4 * generator.standard_normal(count))
+    places, radii = _scattered(settings.rocks, settings.rock_radius, settings, axis, generator)
     for (north, east), radius in zip(places.tolist(), radii.tolist(), strict=True):
         i0, i1 = np.searchsorted(axis, (north - radius, north + radius))
         j0, j1 = np.searchsorted(axis, (east - radius, east + radius))
@@ -185,10 +192,8 @@ def _place_debris(
     settings: SeabedSettings, axis: Array, heights: Array, strength: np.ndarray, generator: Generator
 ) -> None:
     """Boxes on the floor as it is there, each turned its own way."""
-    count = generator.poisson(settings.debris * settings.extent**2)
-    places = generator.uniform(axis[0], axis[-1], (count, 2))
-    lengths = settings.debris_length * np.exp(0.4 * generator.standard_normal(count))
-    turns = generator.uniform(0.0, math.pi, count)
+    places, lengths = _scattered(settings.debris, settings.debris_length, settings, axis, generator)
+    turns = generator.uniform(0.0, math.pi, len(places))
     for (north, east), length, turn in zip(places.tolist(), lengths.tolist(), turns.tolist(), strict=True):
         half = 0.5 * length
         i0, i1 = np.searchsorted(axis, (north - half, north + half))
