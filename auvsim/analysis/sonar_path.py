@@ -108,12 +108,11 @@ def turned_errors(log: VehicleLog) -> TurnedErrors | None:
 
 def turned_path_errors(log: VehicleLog, path: SonarPath) -> TurnedErrors | None:
     """Errors of the keyframes from the dive point on, after the best rotation about it; None without a dive point."""
-    rows = log["path"]
-    marks = np.flatnonzero(~rows["frame"])
-    if not len(marks):
+    began = dive_time(log)
+    if began is None:
         return None
-    after = path.times >= rows["time"][marks[0]]
-    return _turned(log, path.times[after], path.poses[after, :2], rows["pose"][marks[0], :2])
+    after, rows = path.times >= began, log["path"]
+    return _turned(log, path.times[after], path.poses[after, :2], rows["pose"][~rows["frame"]][0, :2])
 
 
 def _turned(log: VehicleLog, times: Array, places: Array, dive: Array) -> TurnedErrors | None:

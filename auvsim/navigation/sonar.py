@@ -201,12 +201,11 @@ class SonarNavigator(ReckoningNavigator):
                 self._depth.update(reading.stamp, float(reading.value[0]))
             elif reading.sensor in self._altimeters:
                 self._hear(reading)
-        fixes = [reading for reading in plain if reading.sensor == "usbl"]
-        means = []
-        for reading in plain:
-            if reading.sensor == self._gyro:
+            elif reading.sensor == self._gyro:
                 for measurement in super()._measured(reading):
                     self._turning.add(reading.stamp, float(measurement.value[0]))
+        fixes = [reading for reading in plain if reading.sensor == "usbl"]
+        means = []
         self._counts.clear()
         for reading, count in averaged([r for r in plain if r not in fixes]):
             means.append(reading._replace(stamp=round(reading.stamp, 6)))

@@ -116,7 +116,7 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
     true: list[tuple[float, int, Array]] = []  # time, phase, place
     shown: dict[str, list[Shown]] = {name: [] for name in (CLOSED, *BESIDE)}
     kept: dict[str, Any] = {}  # the path, and the pose where the dive began, at the end of the lanes and after a fix
-    closures, stamp = 0, math.nan
+    closures = 0
     last = math.ceil(scenario.duration * scenario.rates.control - 1e-6)
     while simulation.ticks < last and not simulation.over:
         before = agent.estimate
@@ -129,13 +129,14 @@ def run_one(seed: int, trial: int, pinned: Mapping[str, Any] | None = None) -> T
                 dive = None if navigator.dive is None else navigator.dive[1][:2].copy()
                 shown[name].append(Shown(e.position[:2].copy(), e.horizontal_covariance.copy(), dive))
         elif phase > LANES and WHOLE not in kept:
-            kept[WHOLE], closures, stamp = (sonar.path, sonar.dive[1]), sonar.closed, sonar.dive[0]
+            kept[WHOLE], closures = (sonar.path, sonar.dive[1]), sonar.closed
         elif phase == HOME and FIXED not in kept and agent.mission.fixed_again:
             kept[FIXED] = sonar.path, sonar.dive[1]  # before any fix by the dock
     if sonar.dive is None or not any(phase == LANES for _, phase, _ in true):
         raise AuvsimError(f"survey, seed {seed}, trial {trial}: ended before the lanes, at {simulation.time:g} s")
     if WHOLE not in kept:
-        kept[WHOLE], closures, stamp = (sonar.path, sonar.dive[1]), sonar.closed, sonar.dive[0]
+        kept[WHOLE], closures = (sonar.path, sonar.dive[1]), sonar.closed
+    stamp = sonar.dive[0]
     times, places = np.array([t for t, _, _ in true]), np.array([place for _, _, place in true])
     dived, on_lanes = int(np.argmin(np.abs(times - stamp))), np.array([phase == LANES for _, phase, _ in true])
     at = places[dived]
